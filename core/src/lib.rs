@@ -1,0 +1,13 @@
+//! Neural RGB-D semantic SLAM after MTE-SLAM, as portable GPU kernels with Rust twins.
+//!
+//! Conventions: camera frame x right, y down, z forward; metres, radians, seconds; poses are
+//! `world_from_camera`; depth is along z and 0 means "no measurement"; the centre of pixel
+//! (u, v) is at image coordinates (u, v), so a pixel covers [u - 0.5, u + 0.5).
+#![cfg_attr(not(feature = "std"), no_std)]
+extern crate alloc;
+
+pub mod camera;
+pub mod classes;
+pub mod frame;
+pub mod pose;
+pub mod sequence;

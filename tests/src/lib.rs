@@ -1,0 +1,1 @@
+//! Test support: shared fixtures of the integration tests in `tests/`.
