@@ -19,14 +19,14 @@
 
 const LUMA: vec3f = vec3f(0.299, 0.587, 0.114);
 // One float a (sum, lane): 8 KiB, beside the 14 KiB of both decoders too much, so sums are staged 8 at a time.
-var<workgroup> stage: array<vec4f, ${WORKGROUP_SIZE}>;
+var<workgroup> stage: array<vec4f, WORKGROUP_SIZE>;
 
-@compute @workgroup_size(${WORKGROUP_SIZE})
+@compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     load_geometry_decoder(lane);
     load_surface_decoders(lane);
     let group = wid.x + wid.y * groups.x;
-    let i = group * ${WORKGROUP_SIZE}u + lane;
+    let i = group * WORKGROUP_SIZE + lane;
     var sums: array<vec4f, 8>;
     if (i < params.rays) {
         // Camera-frame point [m]; w: intensity of the pixel.
@@ -91,7 +91,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     workgroupBarrier();
     if (lane < 4u) {
         var total = 0.0;
-        for (var j = 0u; j < ${WORKGROUP_SIZE}u; j++) {
+        for (var j = 0u; j < WORKGROUP_SIZE; j++) {
             total += stage[j][lane];
         }
         partials[group * 32u + ${k*4}u + lane] = total;

@@ -1,5 +1,6 @@
 // Gradients at the signed distances: through the interval weights (depth, colour), and the distance losses.
 // One invocation a ray.
+#import shared/dispatch.wgsl
 #import shared/params.wgsl
 #import shared/rays.wgsl
 #import shared/planes.wgsl
@@ -16,9 +17,9 @@
 #import shared/appearance.wgsl
 #import shared/weights.wgsl
 
-@compute @workgroup_size(${WORKGROUP_SIZE})
+@compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let ray = (wid.x + wid.y * groups.x) * ${WORKGROUP_SIZE}u + lane;
+    let ray = linear_invocation(wid, groups, lane);
     if (ray >= params.rays) {
         return;
     }

@@ -1,5 +1,6 @@
 // Decoders and class head on composited features, their losses, and the gradients back to the features.
 // One invocation a ray. Colour 32-32-3 with sigmoid, semantic feature 32-32-16, class head 16-C linear.
+#import shared/dispatch.wgsl
 #import shared/params.wgsl
 #import shared/rays.wgsl
 
@@ -13,10 +14,10 @@
 
 #import shared/surface.wgsl
 
-@compute @workgroup_size(${WORKGROUP_SIZE})
+@compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     load_surface_decoders(lane);
-    let ray = (wid.x + wid.y * groups.x) * ${WORKGROUP_SIZE}u + lane;
+    let ray = linear_invocation(wid, groups, lane);
     if (ray >= params.rays) {
         return;
     }

@@ -1,5 +1,6 @@
 // From gradients at the signed distances to gradients at the plane features (written over the features) and,
 // for pose refinement, at the sample positions. One invocation a sample.
+#import shared/dispatch.wgsl
 #import shared/params.wgsl
 #import shared/rays.wgsl
 #import shared/planes.wgsl
@@ -15,10 +16,10 @@
 #import shared/geometry.wgsl
 #import shared/geometry_gradient.wgsl
 
-@compute @workgroup_size(${WORKGROUP_SIZE})
+@compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     load_geometry_decoder(lane);
-    let sample = (wid.x + wid.y * groups.x) * ${WORKGROUP_SIZE}u + lane;
+    let sample = linear_invocation(wid, groups, lane);
     if (sample >= params.rays * params.samples) {
         return;
     }

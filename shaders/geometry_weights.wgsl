@@ -13,7 +13,7 @@
 // 64 samples x (8 vec4 inputs + 4 vec4 deltas).
 var<workgroup> tile: array<vec4f, 768>;
 
-@compute @workgroup_size(${WORKGROUP_SIZE})
+@compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     load_geometry_decoder(lane);
     let count = params.rays * params.samples;

@@ -12,9 +12,9 @@ fn bin_of(error: f32) -> u32 {
     return u32(clamp(i32(bitcast<u32>(error) >> 19u) - 1776, 0, 511));
 }
 
-@compute @workgroup_size(${WORKGROUP_SIZE})
+@compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(local_invocation_index) lane: u32) {
-    for (var ray = lane; ray < params.rays; ray += ${WORKGROUP_SIZE}u) {
+    for (var ray = lane; ray < params.rays; ray += WORKGROUP_SIZE) {
         let error = ray_out[ray * 3u + 2u].z;
         if (error > 0.0) {
             atomicAdd(&bins[bin_of(error)], 1u);
@@ -35,7 +35,7 @@ fn main(@builtin(local_invocation_index) lane: u32) {
         threshold = 10.0 * bitcast<f32>((i + 1777u) << 19u);
     }
     workgroupBarrier();
-    for (var ray = lane; ray < params.rays; ray += ${WORKGROUP_SIZE}u) {
+    for (var ray = lane; ray < params.rays; ray += WORKGROUP_SIZE) {
         let error = ray_out[ray * 3u + 2u].z;
         let masked = error <= 0.0 || error > threshold;
         ray_out[ray * 3u + 2u].w = select(0.0, 1.0, masked);

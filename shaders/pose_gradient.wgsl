@@ -1,5 +1,6 @@
 // Adds the gradients at a ray's sample positions to its pose gradient (translation, rotation about the
 // camera's centre, both in world axes). One invocation a ray.
+#import shared/dispatch.wgsl
 #import shared/params.wgsl
 #import shared/rays.wgsl
 
@@ -8,9 +9,9 @@
 @group(0) @binding(3) var<storage, read> position_gradient: array<vec4f>;
 @group(0) @binding(4) var<storage, read_write> ray_state: array<vec4f>;
 
-@compute @workgroup_size(${WORKGROUP_SIZE})
+@compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let ray = (wid.x + wid.y * groups.x) * ${WORKGROUP_SIZE}u + lane;
+    let ray = linear_invocation(wid, groups, lane);
     if (ray >= params.rays) {
         return;
     }

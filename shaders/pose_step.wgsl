@@ -18,15 +18,15 @@ struct Params {
 // 36 floats a slot: moment1 (6), moment2 (6), best loss, best pose (12), loss of this step, gradient (6), steps.
 @group(0) @binding(5) var<storage, read_write> pose_state: array<f32>;
 
-var<workgroup> partial_v: array<vec4f, ${WORKGROUP_SIZE}>;
-var<workgroup> partial_w: array<vec4f, ${WORKGROUP_SIZE}>;
+var<workgroup> partial_v: array<vec4f, WORKGROUP_SIZE>;
+var<workgroup> partial_w: array<vec4f, WORKGROUP_SIZE>;
 
-@compute @workgroup_size(${WORKGROUP_SIZE})
+@compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let frame = wid.x;
     var v = vec4f(0.0);
     var w = vec4f(0.0);
-    for (var i = lane; i < params.rays_per_frame; i += ${WORKGROUP_SIZE}u) {
+    for (var i = lane; i < params.rays_per_frame; i += WORKGROUP_SIZE) {
         let ray = frame * params.rays_per_frame + i;
         v += vec4f(ray_state[ray * ${RAY_STATE_VEC4}u + ${STATE_POSE}u].xyz, 0.0);
         w += vec4f(ray_state[ray * ${RAY_STATE_VEC4}u + ${STATE_POSE+1}u].xyz, 0.0);
@@ -45,7 +45,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(local_invocation_index) 
     }
     v = vec4f(0.0);
     w = vec4f(0.0);
-    for (var i = 0u; i < ${WORKGROUP_SIZE}u; i++) {
+    for (var i = 0u; i < WORKGROUP_SIZE; i++) {
         v += partial_v[i];
         w += partial_w[i];
     }

@@ -1,4 +1,5 @@
 // The field at single points: signed distance, colour, class. One invocation a point.
+#import shared/dispatch.wgsl
 #import shared/params.wgsl
 #import shared/planes.wgsl
 
@@ -15,11 +16,11 @@
 #import shared/semantic.wgsl
 #import shared/surface.wgsl
 
-@compute @workgroup_size(${WORKGROUP_SIZE})
+@compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     load_geometry_decoder(lane);
     load_surface_decoders(lane);
-    let i = (wid.x + wid.y * groups.x) * ${WORKGROUP_SIZE}u + lane;
+    let i = linear_invocation(wid, groups, lane);
     if (i >= params.rays) {
         return;
     }

@@ -1,6 +1,7 @@
 // Places the samples of each ray, sorted. One invocation a ray.
 // With a depth: stratified up to behind the surface, and stratified around it. Without: the trained signed
 // distance at the stratified samples gives weights, and the second round is drawn from them.
+#import shared/dispatch.wgsl
 #import shared/params.wgsl
 #import shared/random.wgsl
 #import shared/rays.wgsl
@@ -28,10 +29,10 @@ fn exit_depth(origin: vec3f, direction: vec3f) -> f32 {
     return min(t.x, min(t.y, t.z));
 }
 
-@compute @workgroup_size(${WORKGROUP_SIZE})
+@compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     load_geometry_decoder(lane);
-    let ray = (wid.x + wid.y * groups.x) * ${WORKGROUP_SIZE}u + lane;
+    let ray = linear_invocation(wid, groups, lane);
     if (ray >= params.rays) {
         return;
     }

@@ -1,4 +1,5 @@
 // Draws the pixels of a batch and makes their world rays. One invocation a ray.
+#import shared/dispatch.wgsl
 #import shared/params.wgsl
 #import shared/random.wgsl
 #import shared/rays.wgsl
@@ -18,9 +19,9 @@ fn raw_depth(slot: u32, pixel: u32) -> u32 {
     return (depth_images[slot * stride + pixel / 2u] >> (16u * (pixel & 1u))) & 0xffffu;
 }
 
-@compute @workgroup_size(${WORKGROUP_SIZE})
+@compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let ray = (wid.x + wid.y * groups.x) * ${WORKGROUP_SIZE}u + lane;
+    let ray = linear_invocation(wid, groups, lane);
     if (ray >= params.rays) {
         return;
     }

@@ -1,5 +1,6 @@
 // Adds feature gradients into the geometry planes, fixed point. One invocation a (ray, level, plane, channel
 // quad): samples of the ray that share a cell are summed first, so that a cell costs 16 atomics, not 16 a sample.
+#import shared/dispatch.wgsl
 #import shared/params.wgsl
 #import shared/rays.wgsl
 #import shared/planes.wgsl
@@ -25,9 +26,9 @@ fn add(cell: u32, quad: u32, v: vec4f) {
     if (q.w != 0) { atomicAdd(&gradient[i + 3u], q.w); }
 }
 
-@compute @workgroup_size(${WORKGROUP_SIZE})
+@compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let job = (wid.x + wid.y * groups.x) * ${WORKGROUP_SIZE}u + lane;
+    let job = linear_invocation(wid, groups, lane);
     if (job >= params.rays * 24u) {
         return;
     }

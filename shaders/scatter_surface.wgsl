@@ -1,6 +1,7 @@
 // Adds feature gradients into the appearance and semantic planes, fixed point. All samples of a ray share one
 // gradient (features are composited before decoding), so per cell only four scalars are summed.
 // One invocation a (ray, modality, level, plane).
+#import shared/dispatch.wgsl
 #import shared/params.wgsl
 #import shared/rays.wgsl
 #import shared/planes.wgsl
@@ -39,9 +40,9 @@ fn add(modality: u32, cell: u32, w: f32, state: u32, scale: f32) {
     }
 }
 
-@compute @workgroup_size(${WORKGROUP_SIZE})
+@compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let job = (wid.x + wid.y * groups.x) * ${WORKGROUP_SIZE}u + lane;
+    let job = linear_invocation(wid, groups, lane);
     if (job >= params.rays * 12u) {
         return;
     }

@@ -1,5 +1,7 @@
 // Gradients of the decoders that run once a ray: dW[i][o] = sum over rays of input_i * delta_o, and the bias.
 // One invocation a (chunk of rays, i, o); chunks are summed by reduce_partials. Input row I is the bias (input 1).
+#import shared/dispatch.wgsl
+
 struct Params {
     rays: u32,
     inputs: u32,
@@ -24,9 +26,9 @@ struct Params {
 @group(0) @binding(2) var<storage, read> logits_gradient: array<f32>;
 @group(0) @binding(3) var<storage, read_write> partials: array<f32>;
 
-@compute @workgroup_size(${WORKGROUP_SIZE})
+@compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let job = (wid.x + wid.y * groups.x) * ${WORKGROUP_SIZE}u + lane;
+    let job = linear_invocation(wid, groups, lane);
     let per_chunk = (params.inputs + 1u) * params.outputs;
     let chunks = (params.rays + params.chunk - 1u) / params.chunk;
     if (job >= per_chunk * chunks) {

@@ -49,6 +49,8 @@ pub const STATE_END: u32 = 76;
 /// Constants every shader may name as `${NAME}`.
 pub const CONSTANTS: &[(&str, u32)] = &[
     ("CHANNELS", CHANNELS as u32),
+    ("LEVELS", 2),
+    ("UNROLL", 1),
     ("SURFACE_VEC4", (GEOMETRY_FLOATS / 4) as u32),
     ("HEAD_VEC4", (HEAD_FLOATS / 4) as u32),
     ("MAX_STRATIFIED", MAX_STRATIFIED),

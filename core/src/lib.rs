@@ -8,6 +8,11 @@ extern crate alloc;
 
 pub mod camera;
 pub mod classes;
+pub mod engine;
 pub mod frame;
+pub mod kernels;
+pub mod layout;
 pub mod pose;
+pub mod recording;
 pub mod sequence;
+pub mod shader;

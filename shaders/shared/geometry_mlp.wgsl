@@ -5,7 +5,7 @@
 var<workgroup> gw: array<vec4f, 205>;
 
 fn load_geometry_decoder(lane: u32) {
-    for (var i = lane; i < 205u; i += ${WORKGROUP_SIZE}u) {
+    for (var i = lane; i < 205u; i += WORKGROUP_SIZE) {
         gw[i] = decoders[i];
     }
     workgroupBarrier();

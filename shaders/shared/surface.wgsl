@@ -3,7 +3,7 @@
 var<workgroup> sw: array<vec4f, 693>;
 
 fn load_surface_decoders(lane: u32) {
-    for (var i = lane; i < 693u; i += ${WORKGROUP_SIZE}u) {
+    for (var i = lane; i < 693u; i += WORKGROUP_SIZE) {
         sw[i] = decoders[i + ${SURFACE_VEC4}u];
     }
     workgroupBarrier();
