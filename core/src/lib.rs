@@ -16,3 +16,4 @@ pub mod pose;
 pub mod recording;
 pub mod sequence;
 pub mod shader;
+pub mod track;

@@ -1,0 +1,2 @@
+//! Estimating the camera's pose of each frame.
+pub mod odometry;
