@@ -11,3 +11,4 @@ pub mod classes;
 pub mod frame;
 pub mod pose;
 pub mod sequence;
+pub mod synth;
