@@ -17,3 +17,4 @@ pub mod recording;
 pub mod sequence;
 pub mod shader;
 pub mod track;
+pub mod synth;
