@@ -619,7 +619,11 @@ impl Device {
     }
 
     /// Sums of the normal equations over the uploaded pixels at a pose; see `align_points`.
-    pub async fn align(&mut self, pose: &Pose, count: u32) -> Result<[f64; ALIGN_ROW], EngineError> {
+    pub async fn align(
+        &mut self,
+        pose: &Pose,
+        count: u32,
+    ) -> Result<[f64; ALIGN_ROW], EngineError> {
         let mut r = Recording::default();
         self.upload_pose(&mut r, 0, pose);
         let mut p = self.base;

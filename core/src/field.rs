@@ -7,6 +7,7 @@ use crate::{
 };
 use alloc::{vec, vec::Vec};
 use glam::DVec3;
+#[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
 /// One resolution of a set of planes: vertices along x, y, z and the first cell.
@@ -106,7 +107,8 @@ impl FieldShape {
     /// Copies plane values of `old` into the larger `self`; new cells get `fresh` values.
     /// `surface` chooses the grid.
     pub fn carry_over(&self, old: &FieldShape, surface: bool, values: &[f32], fresh: &mut [f32]) {
-        let (from, to) = if surface { (&old.surface, &self.surface) } else { (&old.geometry, &self.geometry) };
+        let (from, to) =
+            if surface { (&old.surface, &self.surface) } else { (&old.geometry, &self.geometry) };
         let cells = self.cells_m[usize::from(surface)];
         for level in 0..2 {
             let shift: [u32; 3] = core::array::from_fn(|k| {
@@ -151,9 +153,15 @@ pub fn decoder_floats(classes: u32) -> usize {
 pub fn initial_decoders(classes: u32, seed: u32) -> Vec<f32> {
     let mut w = vec![0.0; decoder_floats(classes)];
     let mut at = 0;
-    for (inputs, outputs, gain) in
-        [(32, 16, 1.0), (16, 16, 1.0), (16, 1, 0.5), (32, 32, 1.0), (32, 4, 0.5), (32, 32, 1.0), (32, 16, 1.0)]
-    {
+    for (inputs, outputs, gain) in [
+        (32, 16, 1.0),
+        (16, 16, 1.0),
+        (16, 1, 0.5),
+        (32, 32, 1.0),
+        (32, 4, 0.5),
+        (32, 32, 1.0),
+        (32, 16, 1.0),
+    ] {
         let limit = gain * (6.0 / inputs as f32).sqrt();
         for _ in 0..inputs * outputs {
             w[at] = (2.0 * random_f32(seed, 0x1719, at as u32, 7) - 1.0) * limit;
@@ -179,10 +187,8 @@ mod tests {
     #[test]
     fn growing_keeps_every_cell() {
         let config = FieldConfig::default();
-        let small = FieldShape::new(
-            Bounds { min: DVec3::ZERO, max: DVec3::new(1.0, 1.3, 0.9) },
-            &config,
-        );
+        let small =
+            FieldShape::new(Bounds { min: DVec3::ZERO, max: DVec3::new(1.0, 1.3, 0.9) }, &config);
         let grown = small
             .grown(Bounds { min: DVec3::splat(-0.5), max: DVec3::splat(1.2) }, &config)
             .unwrap();

@@ -2,7 +2,6 @@
 use super::shared::{Grid, Ray, interval_alpha, phi};
 use super::{CpuDispatch, store_f32};
 use crate::{
-    kernel,
     layout::{FieldParams, RAY_STATE_FLOATS, STATE_APPEARANCE, STATE_DEPTH, STATE_SEMANTIC},
 };
 

@@ -2,7 +2,6 @@
 use super::shared::{FLAG_POSE, Grid, Ray, cross, phi};
 use super::{CpuDispatch, load_f32, store_f32};
 use crate::{
-    kernel,
     layout::{
         FieldParams, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_APPEARANCE_GRADIENT, STATE_DEPTH,
         STATE_POSE,

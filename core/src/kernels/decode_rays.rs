@@ -5,7 +5,6 @@ use super::shared::{
 };
 use super::{CpuDispatch, load_f32, store_f32, store_u32};
 use crate::{
-    kernel,
     layout::{
         FieldParams, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_APPEARANCE, STATE_APPEARANCE_GRADIENT,
         STATE_COLOR_DELTA, STATE_COLOR_HIDDEN, STATE_COLOR_HIDDEN_DELTA, STATE_DEPTH,

@@ -2,7 +2,6 @@
 use super::shared::{geometry_decoder, geometry_deltas};
 use super::{CpuDispatch, store_f32};
 use crate::{
-    kernel,
     layout::{FieldParams, GEOMETRY_FLOATS},
 };
 

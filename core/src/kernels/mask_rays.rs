@@ -1,7 +1,6 @@
 //! Takes outliers out of the tracking losses.
 use super::{CpuDispatch, load_f32, store_f32};
 use crate::{
-    kernel,
     layout::{FieldParams, RAY_OUT_FLOATS},
 };
 

@@ -2,7 +2,6 @@
 use super::shared::{Ray, cross};
 use super::{CpuDispatch, load_f32, store_f32};
 use crate::{
-    kernel,
     layout::{FieldParams, RAY_STATE_FLOATS, STATE_POSE},
 };
 

@@ -2,9 +2,7 @@
 use super::shared::cross;
 use super::{CpuDispatch, load_f32, store_f32};
 use crate::{
-    kernel,
     layout::{RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_POSE},
-    params,
 };
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;

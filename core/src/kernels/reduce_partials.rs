@@ -1,6 +1,5 @@
 //! Sums rows of partial gradients in a fixed order.
 use super::{CpuDispatch, store_f32};
-use crate::{kernel, params};
 
 params! {
     /// Parameters of [`REDUCE_PARTIALS`].

@@ -4,7 +4,6 @@ use super::shared::{
 };
 use super::{CpuDispatch, store_f32};
 use crate::{
-    kernel,
     layout::{FieldParams, MAX_STRATIFIED},
 };
 

@@ -1,7 +1,7 @@
 //! Pixel and ray sampling.
 use super::CpuDispatch;
 use super::shared::{FLAG_DENSE, FLAG_GUIDED, RAY_MASKED, RAY_WORDS, Ray, random_u32};
-use crate::{kernel, kernels::store_u32, layout::FieldParams};
+use crate::{kernels::store_u32, layout::FieldParams};
 
 kernel! {
     /// Draws the pixels of a batch and makes their world rays.

@@ -3,7 +3,6 @@ use super::scatter_geometry::add_quanta;
 use super::shared::{Grid, Ray, plane_corners};
 use super::CpuDispatch;
 use crate::{
-    kernel,
     layout::{
         FieldParams, RAY_STATE_FLOATS, STATE_APPEARANCE_GRADIENT, STATE_SEMANTIC_GRADIENT,
     },

@@ -85,11 +85,8 @@ impl Slam {
         self.observations.push(Observation { frame: frame.index, depth });
 
         let m = &self.config.mapping;
-        let (iterations, factor) = if first {
-            (m.first_iterations, m.first_rate_factor)
-        } else {
-            (m.iterations, 1.0)
-        };
+        let (iterations, factor) =
+            if first { (m.first_iterations, m.first_rate_factor) } else { (m.iterations, 1.0) };
         let near: Vec<usize> = (0..self.keyframes.len() - 1)
             .filter(|&i| {
                 let k = &self.keyframes[i];
@@ -120,7 +117,8 @@ impl Slam {
         while left > 0 {
             let n = left.min(20);
             let factor = 0.1 + 0.9 * f64::from(left) / f64::from(m.final_iterations);
-            let rates = Rates { planes: m.rate_planes * factor, decoders: m.rate_decoders * factor };
+            let rates =
+                Rates { planes: m.rate_planes * factor, decoders: m.rate_decoders * factor };
             self.optimise(n, rates, &all).await?;
             left -= n;
         }
@@ -162,7 +160,8 @@ impl Slam {
         // Grow with the margin, so that the next frames fit as well.
         let wanted = Bounds { min: held.min - margin, max: held.max + margin };
         if let Some(shape) = device.shape.grown(wanted, &config) {
-            if shape.surface_floats().max(shape.geometry_floats()) > device.engine.max_buffer_words()
+            if shape.surface_floats().max(shape.geometry_floats())
+                > device.engine.max_buffer_words()
             {
                 // The map stays as it is; surfaces outside it are ignored.
                 self.bounds_refused = true;
@@ -191,9 +190,8 @@ impl Slam {
         let loss = self.config.loss.clone();
         let seed = self.config.seed;
         let n = self.keyframes.len();
-        let refine = m.refine_poses
-            && self.config.tracking.tracker != Tracker::Truth
-            && n > REFINE_AFTER;
+        let refine =
+            m.refine_poses && self.config.tracking.tracker != Tracker::Truth && n > REFINE_AFTER;
         let window_size = (m.window as usize).min(WINDOW_MAX).min(n);
         let keyframes: Vec<(u32, _)> =
             self.keyframes.iter().map(|k| (k.slot, k.world_from_camera)).collect();

@@ -211,8 +211,7 @@ impl Slam {
         }
         let end = now(self);
         self.follow_odometer();
-        let world_from_camera =
-            self.frames.last().map_or(Pose::IDENTITY, |f| f.world_from_camera);
+        let world_from_camera = self.frames.last().map_or(Pose::IDENTITY, |f| f.world_from_camera);
         Ok(FrameReport {
             status,
             world_from_camera,

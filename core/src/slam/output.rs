@@ -139,7 +139,8 @@ impl Slam {
         mesh.remove_small_components(ComponentSize::Triangles(min_triangles));
         mesh.compute_normals();
 
-        let points: Vec<[f32; 4]> = mesh.positions.iter().map(|p| [p[0], p[1], p[2], 0.0]).collect();
+        let points: Vec<[f32; 4]> =
+            mesh.positions.iter().map(|p| [p[0], p[1], p[2], 0.0]).collect();
         let device = self.device()?;
         let classes = device.classes > 0;
         let values = device.query_surface(&points).await?;

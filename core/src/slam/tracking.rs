@@ -24,7 +24,7 @@ impl Slam {
         &mut self,
         frame: &Frame,
     ) -> Result<(TrackingStatus, bool), SlamError> {
-        let mut push = |frames: &mut alloc::vec::Vec<PoseEstimate>, pose, status| {
+        let push = |frames: &mut alloc::vec::Vec<PoseEstimate>, pose, status| {
             frames.push(PoseEstimate {
                 frame: frame.index,
                 time_s: frame.time_s,
@@ -52,8 +52,7 @@ impl Slam {
             return Ok((status, first));
         }
         let config = self.odometer.config().pyramid.clone();
-        let pyramid =
-            RgbdPyramid::new(frame, &self.info.camera, self.info.depth_unit_m, &config)?;
+        let pyramid = RgbdPyramid::new(frame, &self.info.camera, self.info.depth_unit_m, &config)?;
         let start = first.then(|| frame.truth.unwrap_or(Pose::IDENTITY));
         let found = self.odometer.track(pyramid, start)?;
         let mut pose = found.world_from_camera;

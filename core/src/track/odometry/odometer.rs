@@ -163,6 +163,25 @@ impl Odometer {
         }
     }
 
+    /// Correct the pose of any frame so far (the mapper refined it). The pose of a keyframe's frame
+    /// moves the keyframe, and with it the frames located relative to it. Returns whether the
+    /// frame is known and the pose finite.
+    pub fn set_frame_pose(&mut self, frame: usize, pose: Pose) -> bool {
+        if let Some(id) = self.keyframes.iter().find(|k| k.frame == frame).map(|k| k.id) {
+            return self.set_keyframe_pose(id, pose);
+        }
+        if self.tracked.last().is_some_and(|t| t.frame == frame) {
+            self.set_last_pose(pose);
+            return pose.is_finite();
+        }
+        let Some(t) = self.tracked.iter_mut().find(|t| t.frame == frame) else { return false };
+        let Some(k) = self.poses.get(&t.keyframe).filter(|_| pose.is_finite()) else {
+            return false;
+        };
+        t.keyframe_from_camera = k.inverse().compose(&pose);
+        true
+    }
+
     /// Constant-velocity prediction of the next frame's pose; identity before the first frame.
     pub fn predict(&self) -> Pose {
         match &self.last {
