@@ -9,5 +9,7 @@ extern crate alloc;
 pub mod camera;
 pub mod classes;
 pub mod frame;
+pub mod mesh;
+pub mod metrics;
 pub mod pose;
 pub mod sequence;
