@@ -49,5 +49,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     println!("{:.1} ms a frame", start.elapsed().as_secs_f64() * 1e3 / f64::from(shown));
     sheet.save(out)?;
+    // The colour images alone, twice as large.
+    let mut large = RgbImage::new(w * 6, h * 8);
+    for (x, y, pixel) in large.enumerate_pixels_mut() {
+        let k = y / (2 * h) * 3 + x / (2 * w);
+        let (u, v) = (x % (2 * w) / 2, y % (2 * h) / 2);
+        *pixel = *sheet.get_pixel(k % 6 * w + u, k / 6 * 3 * h + v);
+    }
+    large.save(out.replace(".png", "-colour.png"))?;
     Ok(())
 }
