@@ -146,7 +146,7 @@ pub fn books(b: &mut Builder, range: [f32; 2], front: f32, z: f32, tall: f32) {
             [x + w - 0.002, front + inset + depth, z + h],
         );
         x += w;
-        if b.rng.next() % 9 == 0 {
+        if b.rng.next().is_multiple_of(9) {
             x += b.rng.range(0.04, 0.12);
         }
     }
