@@ -3,6 +3,7 @@ use super::{
     OdometryError,
     align::{Alignment, Reference, align_levels},
     config::OdometryConfig,
+    features::Features,
     pose_graph::{Edge, PoseGraph},
     pyramid::RgbdPyramid,
     thumbnail::Thumbnail,
@@ -21,6 +22,7 @@ pub struct Keyframe {
     pub world_from_camera: Pose,
     pyramid: RgbdPyramid,
     thumbnail: Thumbnail,
+    features: Features,
 }
 
 /// Why a frame counts as lost.
@@ -215,19 +217,34 @@ impl Odometer {
         let mut found = None;
         let mut reason = LostReason::NoDepth;
         if current.check().is_ok() {
-            let mut best = self.attempt(&last, &last_pose, &current, &predicted)?;
-            reason = self.judge(&best.0, &last_pose).err().unwrap_or(LostReason::FewInliers);
-            if self.judge(&best.0, &last_pose).is_err() || self.lost_streak > 0 {
-                recovered = true;
+            let mut best = self.attempt(Some((&last, &last_pose)), &current, &predicted)?;
+            let verdict = self.judge(&best.0, &last_pose);
+            let step = last_pose.inverse().compose(&best.0.pose);
+            let motion =
+                step.translation.length() / current.median_depth_m.max(0.2) + step.angle_rad();
+            if verdict.is_err()
+                || self.lost_streak > 0
+                || motion > self.config.wide_motion
+                || best.0.inlier_ratio < self.config.doubtful_inlier_ratio
+            {
+                recovered = verdict.is_err() || self.lost_streak > 0;
+                for start in self.matched_starts(&last, &last_pose, &current, recovered) {
+                    let other = self.attempt(None, &current, &start)?;
+                    if other.0.score < best.0.score {
+                        best = other;
+                    }
+                }
+            }
+            if recovered && self.judge(&best.0, &last_pose).is_err() {
                 for (start, id) in self.starts(&current, &last_pose) {
-                    let other = match id {
-                        None => self.attempt(&last, &last_pose, &current, &start)?,
+                    let near = match id {
+                        None => (&last, &last_pose),
                         Some(k) => {
                             let k = &self.keyframes[k];
-                            let (p, at) = (&k.pyramid, k.world_from_camera);
-                            self.attempt(p, &at, &current, &start)?
+                            (&k.pyramid, &k.world_from_camera)
                         }
                     };
+                    let other = self.attempt(Some(near), &current, &start)?;
                     if other.0.score < best.0.score {
                         best = other;
                     }
@@ -301,15 +318,20 @@ impl Odometer {
     /// Returns the alignment and the identifiers of the keyframes used, best first.
     fn attempt(
         &self,
-        near: &RgbdPyramid,
-        near_pose: &Pose,
+        near: Option<(&RgbdPyramid, &Pose)>,
         current: &RgbdPyramid,
         start: &Pose,
     ) -> Result<(Alignment, Vec<usize>), OdometryError> {
-        let near_reference =
-            Reference { pyramid: near, world_from_camera: *near_pose, weight: 1.0 };
+        let near_reference = near.map(|(pyramid, pose)| Reference {
+            pyramid,
+            world_from_camera: *pose,
+            weight: 1.0,
+        });
         let align = &self.config.align;
-        let coarse = align_levels(&[near_reference], current, start, align, usize::MAX, 1)?.pose;
+        let coarse = match near_reference {
+            Some(r) => align_levels(&[r], current, start, align, usize::MAX, 1)?.pose,
+            None => *start,
+        };
         let chosen = self.choose(current, &coarse, self.config.references.max(1));
         let mut references: Vec<Reference<'_>> = chosen
             .iter()
@@ -320,7 +342,15 @@ impl Odometer {
             })
             .collect();
         if self.config.last_frame || references.is_empty() {
-            references.push(near_reference);
+            references.extend(near_reference);
+        }
+        if references.is_empty() {
+            // Nothing overlaps with a start that matched corners gave: take what there is.
+            references.extend(self.keyframes.last().map(|k| Reference {
+                pyramid: &k.pyramid,
+                world_from_camera: k.world_from_camera,
+                weight: 1.0,
+            }));
         }
         let fit = align_levels(&references, current, &coarse, align, 2, 0)?;
         Ok((fit, chosen.iter().map(|&k| self.keyframes[k].id).collect()))
@@ -370,6 +400,43 @@ impl Odometer {
         Ok(())
     }
 
+    /// Poses from matched corners with the last frame and with the likeliest keyframes.
+    fn matched_starts(
+        &self,
+        last: &RgbdPyramid,
+        last_pose: &Pose,
+        current: &RgbdPyramid,
+        lost: bool,
+    ) -> Vec<Pose> {
+        let features = Features::new(current);
+        let mut out = Vec::new();
+        if let Some(m) = Features::new(last).locate(&features) {
+            out.push((m.inliers, last_pose.compose(&m.reference_from_current)));
+        }
+        let nearby = if lost {
+            let thumbnail = Thumbnail::new(current);
+            let mut alike: Vec<(f32, usize)> = self
+                .keyframes
+                .iter()
+                .enumerate()
+                .map(|(i, k)| (k.thumbnail.similarity(&thumbnail), i))
+                .collect();
+            alike.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
+            alike.into_iter().take(6).map(|(_, i)| i).collect()
+        } else {
+            self.choose(current, last_pose, 2)
+        };
+        for i in nearby {
+            let k = &self.keyframes[i];
+            if let Some(m) = k.features.locate(&features) {
+                out.push((m.inliers, k.world_from_camera.compose(&m.reference_from_current)));
+            }
+        }
+        out.sort_by(|a, b| b.0.cmp(&a.0));
+        out.truncate(2);
+        out.into_iter().map(|(_, pose)| pose).collect()
+    }
+
     /// Other places to start from: standing still, small turns, and the keyframes that look alike.
     fn starts(&self, current: &RgbdPyramid, last_pose: &Pose) -> Vec<(Pose, Option<usize>)> {
         let mut out: Vec<(Pose, Option<usize>)> = alloc::vec![(*last_pose, None)];
@@ -412,6 +479,7 @@ impl Odometer {
             world_from_camera: pose,
             pyramid: current.clone(),
             thumbnail: Thumbnail::new(current),
+            features: Features::new(current),
         });
         self.poses.insert(id, pose);
         if self.config.pose_graph {
