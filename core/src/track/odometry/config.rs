@@ -139,7 +139,7 @@ impl Default for OdometryConfig {
             max_step_m: 0.6,
             max_step_rad: 0.8,
             wide_motion: 0.06,
-            doubtful_inlier_ratio: 0.7,
+            doubtful_inlier_ratio: 0.85,
             pose_graph: false,
             graph_links: 6,
         }

@@ -224,7 +224,7 @@ impl Features {
             n = count;
             pose = next;
         }
-        (n >= 8 && 4 * n >= matches.len())
+        (n >= 9 && 8 * n >= matches.len())
             .then_some(MatchedPose { reference_from_current: pose, inliers: n })
     }
 }

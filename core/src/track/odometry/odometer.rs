@@ -10,6 +10,7 @@ use super::{
 };
 use crate::pose::Pose;
 use alloc::{collections::BTreeMap, vec::Vec};
+use glam::{DMat3, DVec3};
 
 /// A frame that others are aligned with.
 #[derive(Clone, Debug)]
@@ -228,23 +229,8 @@ impl Odometer {
                 || best.0.inlier_ratio < self.config.doubtful_inlier_ratio
             {
                 recovered = verdict.is_err() || self.lost_streak > 0;
-                for start in self.matched_starts(&last, &last_pose, &current, recovered) {
+                for start in self.search(&last, &last_pose, &current, &predicted, recovered)? {
                     let other = self.attempt(None, &current, &start)?;
-                    if other.0.score < best.0.score {
-                        best = other;
-                    }
-                }
-            }
-            if recovered && self.judge(&best.0, &last_pose).is_err() {
-                for (start, id) in self.starts(&current, &last_pose) {
-                    let near = match id {
-                        None => (&last, &last_pose),
-                        Some(k) => {
-                            let k = &self.keyframes[k];
-                            (&k.pyramid, &k.world_from_camera)
-                        }
-                    };
-                    let other = self.attempt(Some(near), &current, &start)?;
                     if other.0.score < best.0.score {
                         best = other;
                     }
@@ -413,19 +399,7 @@ impl Odometer {
         if let Some(m) = Features::new(last).locate(&features) {
             out.push((m.inliers, last_pose.compose(&m.reference_from_current)));
         }
-        let nearby = if lost {
-            let thumbnail = Thumbnail::new(current);
-            let mut alike: Vec<(f32, usize)> = self
-                .keyframes
-                .iter()
-                .enumerate()
-                .map(|(i, k)| (k.thumbnail.similarity(&thumbnail), i))
-                .collect();
-            alike.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
-            alike.into_iter().take(6).map(|(_, i)| i).collect()
-        } else {
-            self.choose(current, last_pose, 2)
-        };
+        let nearby = if lost { self.alike(current, 6) } else { self.choose(current, last_pose, 2) };
         for i in nearby {
             let k = &self.keyframes[i];
             if let Some(m) = k.features.locate(&features) {
@@ -437,12 +411,59 @@ impl Odometer {
         out.into_iter().map(|(_, pose)| pose).collect()
     }
 
-    /// Other places to start from: standing still, small turns, and the keyframes that look alike.
-    fn starts(&self, current: &RgbdPyramid, last_pose: &Pose) -> Vec<(Pose, Option<usize>)> {
-        let mut out: Vec<(Pose, Option<usize>)> = alloc::vec![(*last_pose, None)];
-        for (x, y) in [(0.15, 0.0), (-0.15, 0.0), (0.0, 0.15), (0.0, -0.15)] {
-            out.push((last_pose.compose(&Pose::from_twist(&[0.0, 0.0, 0.0, x, y, 0.0])), None));
+    /// The most promising of many starts, after coarse alignment: matched corners, standing still,
+    /// turning, moving around the scene's centre, and the keyframes that look alike when lost.
+    fn search(
+        &self,
+        last: &RgbdPyramid,
+        last_pose: &Pose,
+        current: &RgbdPyramid,
+        predicted: &Pose,
+        lost: bool,
+    ) -> Result<Vec<Pose>, OdometryError> {
+        let mut starts: Vec<(Pose, usize, &RgbdPyramid, Pose)> = Vec::new();
+        for pose in self.matched_starts(last, last_pose, current, lost) {
+            starts.push((pose, 2, last, *last_pose));
         }
+        starts.push((*predicted, usize::MAX, last, *last_pose));
+        starts.push((*last_pose, usize::MAX, last, *last_pose));
+        let depth = last.median_depth_m().max(0.2);
+        let centre = Pose { rotation: DMat3::IDENTITY, translation: DVec3::new(0.0, 0.0, depth) };
+        for (x, y) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
+            for angle in [0.12, 0.24] {
+                let turn = Pose::from_twist(&[0.0, 0.0, 0.0, x * angle, y * angle, 0.0]);
+                let orbit = centre.compose(&turn).compose(&centre.inverse());
+                starts.push((last_pose.compose(&orbit), usize::MAX, last, *last_pose));
+                if lost {
+                    starts.push((last_pose.compose(&turn), usize::MAX, last, *last_pose));
+                }
+            }
+        }
+        if lost {
+            for i in self.alike(current, 6) {
+                let k = &self.keyframes[i];
+                starts.push((k.world_from_camera, usize::MAX, &k.pyramid, k.world_from_camera));
+            }
+        }
+        let mut found: Vec<(f64, Pose)> = Vec::new();
+        for (start, coarsest, pyramid, world_from_camera) in starts {
+            let reference = Reference { pyramid, world_from_camera, weight: 1.0 };
+            let fit = align_levels(&[reference], current, &start, &self.config.align, coarsest, 2)?;
+            let new = found.iter().all(|(_, other)| {
+                let d = other.inverse().compose(&fit.pose);
+                d.translation.length() / depth + d.angle_rad() > 0.01
+            });
+            if new {
+                found.push((fit.score, fit.pose));
+            }
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found.truncate(3);
+        Ok(found.into_iter().map(|(_, pose)| pose).collect())
+    }
+
+    /// Positions of the keyframes whose thumbnails resemble the frame's most.
+    fn alike(&self, current: &RgbdPyramid, most: usize) -> Vec<usize> {
         let thumbnail = Thumbnail::new(current);
         let mut alike: Vec<(f32, usize)> = self
             .keyframes
@@ -451,10 +472,8 @@ impl Odometer {
             .map(|(i, k)| (k.thumbnail.similarity(&thumbnail), i))
             .collect();
         alike.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
-        for &(_, i) in alike.iter().take(4) {
-            out.push((self.keyframes[i].world_from_camera, Some(i)));
-        }
-        out
+        alike.truncate(most);
+        alike.into_iter().map(|(_, i)| i).collect()
     }
 
     fn wants_keyframe(&self, fit: &Alignment, pose: &Pose, current: &RgbdPyramid) -> bool {
