@@ -8,6 +8,8 @@ extern crate alloc;
 
 pub mod camera;
 pub mod classes;
+#[cfg(feature = "dataset")]
+pub mod dataset;
 pub mod frame;
 pub mod pose;
 pub mod sequence;
