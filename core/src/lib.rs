@@ -10,6 +10,8 @@ pub mod bench;
 pub mod camera;
 pub mod classes;
 pub mod config;
+#[cfg(feature = "dataset")]
+pub mod dataset;
 pub mod device;
 pub mod engine;
 pub mod field;

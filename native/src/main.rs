@@ -1,2 +1,6 @@
 //! The command line.
+// Used by the commands once they are there.
+#[cfg(test)]
+mod source;
+
 fn main() {}
