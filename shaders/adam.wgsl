@@ -35,17 +35,7 @@ fn flush(x: f32) -> f32 {
     return select(x, 0.0, abs(x) < 1e-30);
 }
 
-@compute @workgroup_size(WORKGROUP_SIZE)
-fn main(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let id = linear_invocation(workgroup, workgroups, local);
-    if (id >= params.count) {
-        return;
-    }
-    let i = params.offset + id;
+fn update(i: u32) {
     let bits = gradient[i];
     var stored: f32;
     if (params.fixed_point == 1u) {
@@ -82,4 +72,32 @@ fn main(
     moment2[i] = v;
     parameters[i] -= params.learning_rate * (m * params.correction1)
         / (sqrt(v * params.correction2) + params.epsilon);
+}
+
+// The next parameter of this invocation, without wrapping around.
+fn next(id: u32, stride: u32) -> u32 {
+    return select(params.count, id + stride, stride < params.count - id);
+}
+
+@compute @workgroup_size(WORKGROUP_SIZE)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    // Whatever the number of workgroups, all parameters get their turn.
+    let stride = workgroups.x * workgroups.y * workgroups.z * WORKGROUP_SIZE;
+    var id = linear_invocation(workgroup, workgroups, local);
+    loop {
+        // Software adapters run both sides of every branch, so zeros are skipped by a loop of
+        // their own; most gradients are zero.
+        while (id < params.count && gradient[params.offset + id] == 0u) {
+            id = next(id, stride);
+        }
+        if (id >= params.count) {
+            break;
+        }
+        update(params.offset + id);
+        id = next(id, stride);
+    }
 }

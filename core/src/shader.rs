@@ -270,9 +270,10 @@ fn end_of_block(
         match line.directive() {
             Some(("for" | "if", _)) => depth += 1,
             Some(("else", _)) if depth == 0 => {
-                if otherwise.replace(i).is_some() {
+                if otherwise.is_some() {
                     return Err(line.error("a second #else"));
                 }
+                otherwise = Some(i);
             }
             Some(("end", _)) if depth == 0 => return Ok(BlockEnd { otherwise, end: i }),
             Some(("end", _)) => depth -= 1,

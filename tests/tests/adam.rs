@@ -73,6 +73,21 @@ fn shader_and_twin_agree() {
 }
 
 #[test]
+fn any_number_of_workgroups_gives_the_same() {
+    let mut engines = vec![Engine::cpu()];
+    engines.extend(gpu_engine());
+    for mut engine in engines {
+        let mut run = |workgroups| {
+            run_kernel(&mut engine, &ADAM, &params(2, 0), &buffers(0), workgroups).unwrap()
+        };
+        let expected = run(workgroups_1d(N, ADAM.workgroup_size));
+        for workgroups in [[1, 1, 1], [3, 2, 1], [200, 1, 1]] {
+            assert!(run(workgroups) == expected, "{workgroups:?}");
+        }
+    }
+}
+
+#[test]
 fn a_perturbed_result_is_caught() {
     let workgroups = workgroups_1d(N, ADAM.workgroup_size);
     let input = buffers(1);

@@ -211,7 +211,8 @@ impl GpuEngine {
         let view = staging
             .get_mapped_range(0..bytes)
             .map_err(|error| unreadable(format!("read-back: {error}")))?;
-        let data = bytemuck::pod_collect_to_vec(&view);
+        let mut data = alloc::vec![0u32; words];
+        bytemuck::cast_slice_mut::<u32, u8>(&mut data).copy_from_slice(&view);
         drop(view);
         staging.unmap();
         self.staging = Some(staging);

@@ -258,7 +258,9 @@ impl Engine {
         let bytes = count.saturating_mul(size_of::<T>());
         let words = self.read(buffer, offset_words, bytes.div_ceil(4)).await?;
         let bytes = &bytemuck::cast_slice::<u32, u8>(&words)[..bytes];
-        Ok(bytemuck::pod_collect_to_vec(bytes))
+        let mut values = alloc::vec![T::zeroed(); count];
+        bytemuck::cast_slice_mut::<T, u8>(&mut values).copy_from_slice(bytes);
+        Ok(values)
     }
 
     /// Waits until all submitted work is done.

@@ -1,5 +1,6 @@
 //! Sparse Adam: one step on the parameters whose gradient is not zero.
 use super::{CpuDispatch, load_f32, load_i32, load_u32, or_u32, store_f32, store_u32};
+use crate::recording::{BufferId, Recording};
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
@@ -56,6 +57,17 @@ kernel! {
     }
 }
 
+/// Parameters that [`record`] leaves to one invocation. With a tenth of the gradients not zero, a
+/// software adapter takes a quarter of the time that one parameter an invocation takes.
+const PARAMETERS_PER_INVOCATION: usize = 32;
+
+/// Records a step. `bindings` are those of [`ADAM`]. Any number of workgroups gives the same
+/// result; this one is quick.
+pub fn record(recording: &mut Recording, params: &AdamParams, bindings: &[BufferId]) {
+    let invocations = (params.count as usize).div_ceil(PARAMETERS_PER_INVOCATION);
+    recording.dispatch_1d(&ADAM, params, bindings, invocations);
+}
+
 /// The bits of a NaN or an infinity.
 fn not_finite(bits: u32) -> bool {
     bits & 0x7f80_0000 == 0x7f80_0000
@@ -69,11 +81,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
     let p: AdamParams = dispatch.params();
     let (parameters, gradient) = (dispatch.write(0), dispatch.write(1));
     let (moment1, moment2, status) = (dispatch.write(2), dispatch.write(3), dispatch.write(4));
-    dispatch.for_each_invocation(|id| {
-        if id >= p.count as usize {
-            return;
-        }
-        let i = p.offset as usize + id;
+    let update = |i: usize| {
         let bits = load_u32(&gradient[i]);
         let g = if p.fixed_point == 1 {
             let fixed = load_i32(&gradient[i]);
@@ -108,5 +116,10 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         store_f32(&moment2[i], v);
         let step = p.learning_rate * (m * p.correction1) / ((v * p.correction2).sqrt() + p.epsilon);
         store_f32(&parameters[i], load_f32(&parameters[i]) - step);
+    };
+    let stride = dispatch.invocations();
+    dispatch.for_each_invocation(|id| {
+        let last = p.offset as usize + p.count as usize;
+        (p.offset as usize + id..last).step_by(stride).for_each(update);
     });
 }

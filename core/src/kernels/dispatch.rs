@@ -77,6 +77,12 @@ impl<'a> CpuDispatch<'a> {
         }
     }
 
+    /// Number of invocations of the whole dispatch, at least 1.
+    pub fn invocations(&self) -> usize {
+        let workgroups = self.workgroups.iter().map(|n| *n as usize).product::<usize>();
+        (workgroups * self.workgroup_size as usize).max(1)
+    }
+
     /// Calls `body` with every linear workgroup id x + count_x * (y + count_y * z), in parallel
     /// and in any order with `std`.
     pub fn for_each_workgroup(&self, body: impl Fn(u32) + Sync + Send) {

@@ -56,7 +56,7 @@ impl core::fmt::Debug for Kernel {
 }
 
 /// Registers a kernel with its twin and binding list:
-/// ```ignore
+/// ```text
 /// kernel! {
 ///     /// What it computes.
 ///     pub static ADAM = "adam" {

@@ -66,7 +66,7 @@ impl ParamsField {
 }
 
 /// Makes a `#[repr(C)]` struct of 4-byte scalars and 16-byte-aligned 4-vectors, and its `LAYOUT`:
-/// ```ignore
+/// ```text
 /// params! {
 ///     /// What the kernel needs.
 ///     pub struct AdamParams {

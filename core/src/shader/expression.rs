@@ -1,8 +1,5 @@
 //! Integer expressions of the preprocessor.
-use alloc::{
-    format,
-    string::{String, ToString},
-};
+use alloc::{format, string::String};
 
 /// Levels of binary operators from weakest to strongest. Longer operators come first where one
 /// begins with another.
@@ -93,7 +90,7 @@ impl Parser<'_> {
         if is_name(word) {
             return (self.lookup)(word).ok_or_else(|| format!("unknown name {word}"));
         }
-        word.parse().map_err(|_| format!("{} is not a number", word.to_string()))
+        word.parse().map_err(|_| format!("{word} is not a number"))
     }
 }
 
