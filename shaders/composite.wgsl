@@ -46,38 +46,52 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
         if (w > params.min_weight) {
             first = min(first, i - 1u);
             last = i;
-            let local = r.origin + z * r.direction - params.box_min.xyz;
-            let g0 = local * params.surface_inv_cell.x;
-            let g1 = local * params.surface_inv_cell.y;
-#for plane in 0..3
-            {
-                let a = plane_corners(${plane}u, g0, params.surface_coarse);
-                let b = plane_corners(${plane}u, g1, params.surface_fine);
-                let ai = a.cell * 4u;
-                let bi = b.cell * 4u;
-                let aw = a.weight * w;
-                let bw = b.weight * w;
-#for q in 0..4
-                appearance[${q}] += aw.x * planes_appearance[ai.x + ${q}u] + aw.y * planes_appearance[ai.y + ${q}u]
-                    + aw.z * planes_appearance[ai.z + ${q}u] + aw.w * planes_appearance[ai.w + ${q}u];
-                appearance[${q+4}] += bw.x * planes_appearance[bi.x + ${q}u] + bw.y * planes_appearance[bi.y + ${q}u]
-                    + bw.z * planes_appearance[bi.z + ${q}u] + bw.w * planes_appearance[bi.w + ${q}u];
-#end
-                if (params.classes > 0u) {
-#for q in 0..4
-                    semantic[${q}] += aw.x * planes_semantic[ai.x + ${q}u] + aw.y * planes_semantic[ai.y + ${q}u]
-                        + aw.z * planes_semantic[ai.z + ${q}u] + aw.w * planes_semantic[ai.w + ${q}u];
-                    semantic[${q+4}] += bw.x * planes_semantic[bi.x + ${q}u] + bw.y * planes_semantic[bi.y + ${q}u]
-                        + bw.z * planes_semantic[bi.z + ${q}u] + bw.w * planes_semantic[bi.w + ${q}u];
-#end
-                }
-            }
-#end
         }
         z0 = z1;
         phi0 = phi1;
     }
     weights[base + params.samples - 1u] = 0.0;
+    // A loop of its own over the intervals that count: machines that run both sides of a branch, as lavapipe,
+    // pay for every pass through a loop's body.
+    var i = min(first, last);
+    loop {
+        while (i < last && weights[base + i] <= params.min_weight) {
+            i++;
+        }
+        if (i >= last) {
+            break;
+        }
+        let w = weights[base + i];
+        let z = 0.5 * (depths[base + i] + depths[base + i + 1u]);
+        let local = r.origin + z * r.direction - params.box_min.xyz;
+        let g0 = local * params.surface_inv_cell.x;
+        let g1 = local * params.surface_inv_cell.y;
+#for plane in 0..3
+        {
+            let a = plane_corners(${plane}u, g0, params.surface_coarse);
+            let b = plane_corners(${plane}u, g1, params.surface_fine);
+            let ai = a.cell * 4u;
+            let bi = b.cell * 4u;
+            let aw = a.weight * w;
+            let bw = b.weight * w;
+#for q in 0..4
+            appearance[${q}] += aw.x * planes_appearance[ai.x + ${q}u] + aw.y * planes_appearance[ai.y + ${q}u]
+                + aw.z * planes_appearance[ai.z + ${q}u] + aw.w * planes_appearance[ai.w + ${q}u];
+            appearance[${q+4}] += bw.x * planes_appearance[bi.x + ${q}u] + bw.y * planes_appearance[bi.y + ${q}u]
+                + bw.z * planes_appearance[bi.z + ${q}u] + bw.w * planes_appearance[bi.w + ${q}u];
+#end
+            if (params.classes > 0u) {
+#for q in 0..4
+                semantic[${q}] += aw.x * planes_semantic[ai.x + ${q}u] + aw.y * planes_semantic[ai.y + ${q}u]
+                    + aw.z * planes_semantic[ai.z + ${q}u] + aw.w * planes_semantic[ai.w + ${q}u];
+                semantic[${q+4}] += bw.x * planes_semantic[bi.x + ${q}u] + bw.y * planes_semantic[bi.y + ${q}u]
+                    + bw.z * planes_semantic[bi.z + ${q}u] + bw.w * planes_semantic[bi.w + ${q}u];
+#end
+            }
+        }
+#end
+        i++;
+    }
     let state = ray * ${RAY_STATE_VEC4}u;
 #for q in 0..8
     ray_state[state + ${STATE_APPEARANCE+q}u] = appearance[${q}];

@@ -51,11 +51,38 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
         }
     }
 
+    // Gradient at the weight of each interval that counts, through its features; kept where the result will go.
+    var pose_v = vec3f(0.0);
+    var pose_w = vec3f(0.0);
+    let range = u32(ray_state[state + ${STATE_DEPTH}u].w);
+    let end = select(range % 256u, 0u, skip);
+    var j = range / 256u;
+    loop {
+        while (j < end && weights[base + j] <= params.min_weight) {
+            j++;
+        }
+        if (j >= end) {
+            break;
+        }
+        let middle = 0.5 * (depths[base + j] + depths[base + j + 1u]);
+        let p = r.origin + middle * r.direction;
+        var f = lookup_appearance(p);
+        var dw = 0.0;
+#for q in 0..8
+        dw += dot(g[${q}], f[${q}]);
+#end
+        distance_gradient[base + j] = dw;
+        if ((params.flags & FLAG_POSE) != 0u) {
+            let dp = lookup_appearance_gradient(p, g) * weights[base + j];
+            pose_v += dp;
+            pose_w += cross(middle * r.direction, dp);
+        }
+        j++;
+    }
+
     // Backwards along the ray: `behind` = sum over later intervals of w * dL/dw.
     var behind = 0.0;
     var loss = 0.0;
-    var pose_v = vec3f(0.0);
-    var pose_w = vec3f(0.0);
     var z1 = depths[base + params.samples - 1u];
     var s1 = distances[base + params.samples - 1u];
     var phi1 = phi(s1);
@@ -80,16 +107,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
             let middle = 0.5 * (z1 + z);
             var dw = ddepth * middle;
             if (w > params.min_weight && !skip) {
-                let p = r.origin + middle * r.direction;
-                var f = lookup_appearance(p);
-#for q in 0..8
-                dw += dot(g[${q}], f[${q}]);
-#end
-                if ((params.flags & FLAG_POSE) != 0u) {
-                    let dp = lookup_appearance_gradient(p, g) * w;
-                    pose_v += dp;
-                    pose_w += cross(middle * r.direction, dp);
-                }
+                dw += distance_gradient[base + i - 1u];
             }
             // alpha = 1 - phi(s) / phi(s1) where s falls, else 0.
             if (phi_here < phi1) {

@@ -50,9 +50,14 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     var a1 = vec4f(0.0);
     var a2 = vec4f(0.0);
     var a3 = vec4f(0.0);
-    for (var i = 0u; i < params.samples; i++) {
-        if (distance_gradient[base + i] == 0.0) {
-            continue;
+    var i = 0u;
+    loop {
+        // Skipping in a loop of its own lets each lane go on to its next sample (see composite).
+        while (i < params.samples && distance_gradient[base + i] == 0.0) {
+            i++;
+        }
+        if (i >= params.samples) {
+            break;
         }
         let v = features[(base + i) * 8u + level * 4u + quad];
         let c = plane_corners(plane, origin + depths[base + i] * direction, grid);
@@ -73,6 +78,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
         a1 += c.weight.y * v;
         a2 += c.weight.z * v;
         a3 += c.weight.w * v;
+        i++;
     }
     if (held.x != 0xffffffffu) {
         add(held.x, quad, a0);

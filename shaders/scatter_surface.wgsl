@@ -67,11 +67,16 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     var held = vec4<u32>(0xffffffffu);
     var sum = vec4f(0.0);
     let range = u32(ray_state[ray * ${RAY_STATE_VEC4}u + ${STATE_DEPTH}u].w);
-    for (var i = range / 256u; i < range % 256u; i++) {
-        let w = weights[base + i];
-        if (w <= params.min_weight) {
-            continue;
+    let end = range % 256u;
+    var i = range / 256u;
+    loop {
+        while (i < end && weights[base + i] <= params.min_weight) {
+            i++;
         }
+        if (i >= end) {
+            break;
+        }
+        let w = weights[base + i];
         let z = 0.5 * (depths[base + i] + depths[base + i + 1u]);
         let c = plane_corners(plane, origin + z * direction, grid);
         if (c.cell.x != held.x) {
@@ -85,6 +90,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
             sum = vec4f(0.0);
         }
         sum += c.weight * w;
+        i++;
     }
     if (held.x != 0xffffffffu) {
         add(modality, held.x, quad, g * sum.x);

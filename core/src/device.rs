@@ -27,7 +27,7 @@ use crate::{
         weight_gradient::{WEIGHT_GRADIENT, WeightGradientParams},
     },
     layout::{
-        FieldParams, GEOMETRY_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_APPEARANCE,
+        BACKWARD_STRIP, FieldParams, GEOMETRY_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_APPEARANCE,
         STATE_COLOR_DELTA, STATE_COLOR_HIDDEN, STATE_COLOR_HIDDEN_DELTA, STATE_FEATURE,
         STATE_FEATURE_DELTA, STATE_SEMANTIC, STATE_SEMANTIC_HIDDEN, STATE_SEMANTIC_HIDDEN_DELTA,
     },
@@ -441,7 +441,7 @@ impl Device {
                 self.features,
                 self.position_gradient,
             ],
-            samples,
+            samples.div_ceil(BACKWARD_STRIP as usize),
         );
         if b.flags & FLAG_POSE != 0 {
             r.dispatch_1d(

@@ -9,6 +9,8 @@ pub const SURFACE_FLOATS: usize = 693 * 4;
 pub const HEAD_FLOATS: usize = GEOMETRY_FLOATS + SURFACE_FLOATS;
 /// Most stratified samples a ray.
 pub const MAX_STRATIFIED: u32 = 128;
+/// Samples an invocation of geometry_backward goes through.
+pub const BACKWARD_STRIP: u32 = 8;
 /// Floats a cell of a plane holds.
 pub const CHANNELS: usize = 16;
 /// Floats a ray keeps between the forward and the backward pass.
@@ -53,6 +55,7 @@ pub const CONSTANTS: &[(&str, u32)] = &[
     ("UNROLL", 1),
     ("SURFACE_VEC4", (GEOMETRY_FLOATS / 4) as u32),
     ("HEAD_VEC4", (HEAD_FLOATS / 4) as u32),
+    ("BACKWARD_STRIP", BACKWARD_STRIP),
     ("MAX_STRATIFIED", MAX_STRATIFIED),
     ("RAY_STATE_VEC4", STATE_END),
     ("STATE_APPEARANCE", STATE_APPEARANCE),

@@ -3,7 +3,7 @@ use super::shared::{
     FLAG_MAP, FLAG_POSE, Grid, Ray, geometry_decoder, geometry_deltas, geometry_feature_gradient,
 };
 use super::{CpuDispatch, load_f32, store_f32};
-use crate::{layout::FieldParams};
+use crate::{layout::{BACKWARD_STRIP, FieldParams}};
 
 kernel! {
     /// Gradients at the plane features (over the features) and at the sample positions.
@@ -30,10 +30,8 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         (dispatch.read_f32(2), dispatch.read_f32(3), dispatch.read_f32(4));
     let (features, positions) = (dispatch.write(5), dispatch.write(6));
     let grid = Grid::geometry(&p);
-    dispatch.for_each_invocation(|sample| {
-        if sample >= (p.rays * p.samples) as usize {
-            return;
-        }
+    let count = (p.rays * p.samples) as usize;
+    let one = |sample: usize| {
         let mut f = [0.0; 32];
         let mut dp = [0.0; 3];
         if gradient[sample] != 0.0 {
@@ -59,5 +57,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             }
             store_f32(&positions[sample * 4 + 3], 0.0);
         }
-    });
+    };
+    let strip = BACKWARD_STRIP as usize;
+    dispatch.for_each_invocation(|id| (id * strip..((id + 1) * strip).min(count)).for_each(one));
 }
