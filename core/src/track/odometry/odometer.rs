@@ -338,7 +338,8 @@ impl Odometer {
                 weight: 1.0,
             }));
         }
-        let fit = align_levels(&references, current, &coarse, align, 2, 0)?;
+        let fit =
+            align_levels(&references, current, &coarse, align, 1 + usize::from(near.is_none()), 0)?;
         Ok((fit, chosen.iter().map(|&k| self.keyframes[k].id).collect()))
     }
 
