@@ -244,7 +244,7 @@ pub(super) fn align_levels(
 /// Every how many points one is used; never a divisor of the row, which would pick columns.
 fn stride(points: usize, most: usize, width: usize) -> usize {
     let mut s = points.div_ceil(most.max(1)).max(1);
-    while s > 1 && width % s == 0 {
+    while s > 1 && width.is_multiple_of(s) {
         s += 1;
     }
     s

@@ -132,7 +132,7 @@ impl Default for OdometryConfig {
             references: 3,
             last_frame: false,
             keyframe_overlap: 0.7,
-            keyframe_motion: 0.15,
+            keyframe_motion: 0.08,
             max_keyframes: 200,
             min_inlier_ratio: 0.35,
             min_overlap: 0.12,

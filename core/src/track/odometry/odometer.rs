@@ -407,7 +407,7 @@ impl Odometer {
                 out.push((m.inliers, k.world_from_camera.compose(&m.reference_from_current)));
             }
         }
-        out.sort_by(|a, b| b.0.cmp(&a.0));
+        out.sort_by_key(|m| core::cmp::Reverse(m.0));
         out.truncate(2);
         out.into_iter().map(|(_, pose)| pose).collect()
     }
