@@ -241,6 +241,15 @@ pub(super) fn align_levels(
     Ok(result)
 }
 
+/// Every how many points one is used; never a divisor of the row, which would pick columns.
+fn stride(points: usize, most: usize, width: usize) -> usize {
+    let mut s = points.div_ceil(most.max(1)).max(1);
+    while s > 1 && width.is_multiple_of(s) {
+        s += 1;
+    }
+    s
+}
+
 fn rescale(states: &mut [State], sums: &[Sums], config: &AlignConfig) {
     for (state, sums) in states.iter_mut().zip(sums) {
         if let Some(x) = sums.geometric_mad() {
@@ -291,7 +300,7 @@ fn build(
             normal_cos: config.normal_cos,
             pixel_noise: config.pixel_noise,
             noise: current.noise,
-            stride: points.len().div_ceil(config.max_points.max(1)).max(1),
+            stride: stride(points.len(), config.max_points, current.levels[level].width),
         };
         let sums = evaluate(&reference.pyramid.levels[level], points, &model);
         // Exposure is eliminated (Schur complement); a weak prior keeps it near (1, 0).

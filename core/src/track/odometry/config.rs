@@ -69,8 +69,8 @@ pub struct AlignConfig {
 impl Default for AlignConfig {
     fn default() -> Self {
         Self {
-            iterations: [6, 8, 10, 12],
-            max_points: 100_000,
+            iterations: [4, 5, 6, 8],
+            max_points: 6000,
             kernel_width: 2.5,
             photometric_weight: 1.0,
             geometric_weight: 1.0,
@@ -81,7 +81,7 @@ impl Default for AlignConfig {
             min_photometric_sigma: 0.002,
             min_geometric_scale: 0.05,
             degenerate_ratio: 1e-6,
-            convergence: 2e-5,
+            convergence: 1e-4,
         }
     }
 }
@@ -132,13 +132,13 @@ impl Default for OdometryConfig {
             references: 3,
             last_frame: false,
             keyframe_overlap: 0.7,
-            keyframe_motion: 0.15,
+            keyframe_motion: 0.08,
             max_keyframes: 200,
             min_inlier_ratio: 0.35,
             min_overlap: 0.12,
             max_step_m: 0.6,
             max_step_rad: 0.8,
-            wide_motion: 0.06,
+            wide_motion: 0.12,
             doubtful_inlier_ratio: 0.85,
             pose_graph: false,
             graph_links: 6,

@@ -104,7 +104,7 @@ pub fn solve_constrained(
     let largest = values[5];
     let mut step = [0.0; 6];
     let mut left_out = 0;
-    if !(largest > 0.0) || !largest.is_finite() {
+    if largest.is_nan() || largest <= 0.0 || largest.is_infinite() {
         return (step, values, 6);
     }
     for (value, vector) in values.iter().zip(&vectors) {
@@ -134,7 +134,7 @@ pub fn solve_cholesky(a: &mut [f64], b: &mut [f64]) -> bool {
                 sum -= a[i * n + k] * a[j * n + k];
             }
             if i == j {
-                if !(sum > 0.0) {
+                if sum.is_nan() || sum <= 0.0 {
                     return false;
                 }
                 a[j * n + j] = sum.sqrt();

@@ -357,7 +357,8 @@ impl Odometer {
                 weight: 1.0,
             }));
         }
-        let fit = align_levels(&references, current, &coarse, align, 2, 0)?;
+        let fit =
+            align_levels(&references, current, &coarse, align, 1 + usize::from(near.is_none()), 0)?;
         Ok((fit, chosen.iter().map(|&k| self.keyframes[k].id).collect()))
     }
 
@@ -425,7 +426,7 @@ impl Odometer {
                 out.push((m.inliers, k.world_from_camera.compose(&m.reference_from_current)));
             }
         }
-        out.sort_by(|a, b| b.0.cmp(&a.0));
+        out.sort_by_key(|m| core::cmp::Reverse(m.0));
         out.truncate(2);
         out.into_iter().map(|(_, pose)| pose).collect()
     }

@@ -3,8 +3,6 @@ use super::linear::solve_cholesky;
 use crate::pose::Pose;
 use alloc::{vec, vec::Vec};
 use glam::{DMat3, DVec3};
-#[cfg(not(feature = "std"))]
-use num_traits::Float as _;
 
 /// A measured relative pose.
 #[derive(Clone, Debug)]
