@@ -23,9 +23,10 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     load_geometry_decoder(lane);
     // A strip of samples an invocation, idle ones skipped in a loop of their own (see composite).
     let count = params.rays * params.samples;
-    let strip = linear_invocation(wid, groups, lane) * STRIP;
-    let end = min(strip + STRIP, count);
-    for (var i = strip; i < end; i++) {
+    // Interleaved, so that every lane gets its share of the samples near surfaces.
+    let first = linear_workgroup(wid, groups) * WORKGROUP_SIZE * STRIP + lane;
+    let end = min(first + STRIP * WORKGROUP_SIZE, count);
+    for (var i = first; i < end; i += WORKGROUP_SIZE) {
         if (distance_gradient[i] == 0.0) {
             if ((params.flags & FLAG_MAP) != 0u) {
 #for q in 0..8
@@ -37,10 +38,10 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
             }
         }
     }
-    var sample = strip;
+    var sample = first;
     loop {
         while (sample < end && distance_gradient[sample] == 0.0) {
-            sample++;
+            sample += WORKGROUP_SIZE;
         }
         if (sample >= end) {
             break;
@@ -61,6 +62,6 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
             features[sample * 8u + ${q}u] = f[${q}];
 #end
         }
-        sample++;
+        sample += WORKGROUP_SIZE;
     }
 }
