@@ -8,6 +8,12 @@ extern crate alloc;
 
 pub mod camera;
 pub mod classes;
+pub mod config;
+pub mod engine;
 pub mod frame;
+pub mod mesh;
+pub mod metrics;
 pub mod pose;
 pub mod sequence;
+pub mod slam;
+pub mod synth;
