@@ -1,1 +1,220 @@
-//! Test support: shared fixtures of the integration tests in `tests/`.
+//! Test support: engines, and the comparison of a kernel's shader with its Rust twin.
+use bytemuck::Pod;
+use mte_slam_core::{
+    engine::{Engine, EngineError, GpuOptions},
+    kernels::Kernel,
+    recording::Recording,
+    shader,
+};
+use pollster::block_on;
+
+/// A GPU engine, or None with a printed line where there is no adapter. With the environment
+/// variable `MTE_SLAM_REQUIRE_GPU=1` a missing adapter is a failure.
+pub fn gpu_engine() -> Option<Engine> {
+    gpu_engine_with(GpuOptions::default())
+}
+
+/// As [`gpu_engine`], with options.
+pub fn gpu_engine_with(options: GpuOptions) -> Option<Engine> {
+    match block_on(Engine::gpu(options)) {
+        Ok(engine) => Some(engine),
+        Err(error) => {
+            let required = std::env::var("MTE_SLAM_REQUIRE_GPU").is_ok_and(|value| value == "1");
+            assert!(!required, "MTE_SLAM_REQUIRE_GPU=1: {error}");
+            println!("skipped: {error}");
+            None
+        }
+    }
+}
+
+/// How the words of a binding are compared.
+#[derive(Copy, Clone, Debug, PartialEq)]
+pub enum Compare {
+    /// As f32: |a - b| <= absolute + relative * max(|a|, |b|); NaN equals NaN.
+    F32 {
+        /// Allowed difference whatever the size.
+        absolute: f32,
+        /// Allowed difference in parts of the larger one.
+        relative: f32,
+    },
+    /// As i32: |a - b| <= quanta.
+    I32 {
+        /// Allowed difference.
+        quanta: u32,
+    },
+    /// Equal bits.
+    U32,
+}
+
+/// How two engines' results may differ: one entry a binding, in binding order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tolerance(pub Vec<Compare>);
+
+/// Two engines' results differ, or a run failed.
+#[derive(Clone, Debug)]
+pub enum Mismatch {
+    /// The engine refused or failed.
+    Engine(EngineError),
+    /// The harness was given a wrong number of buffers or tolerances.
+    Count {
+        /// Bindings of the kernel.
+        expected: usize,
+        /// Buffers.
+        buffers: usize,
+        /// Entries of the tolerance.
+        tolerances: usize,
+    },
+    /// The first word that differs.
+    Word {
+        /// The kernel's name.
+        kernel: &'static str,
+        /// The binding's name.
+        binding: &'static str,
+        /// Index of the word.
+        index: usize,
+        /// The expected and the found value, as the binding's type.
+        expected: String,
+        /// See `expected`.
+        found: String,
+        /// Words of this binding that differ.
+        count: usize,
+    },
+}
+
+impl From<EngineError> for Mismatch {
+    fn from(error: EngineError) -> Self {
+        Mismatch::Engine(error)
+    }
+}
+
+/// Runs a kernel once from the given buffers and returns all buffers afterwards.
+pub fn run_kernel<P: Pod>(
+    engine: &mut Engine,
+    kernel: &'static Kernel,
+    params: &P,
+    buffers: &[Vec<u32>],
+    workgroups: [u32; 3],
+) -> Result<Vec<Vec<u32>>, EngineError> {
+    let mut recording = Recording::new();
+    let mut ids = Vec::new();
+    for (i, words) in buffers.iter().enumerate() {
+        let name = kernel.bindings.get(i).map_or("surplus", |binding| binding.name);
+        let id = engine.create_buffer(name, words.len())?;
+        recording.upload(id, 0, words);
+        ids.push(id);
+    }
+    recording.dispatch(kernel, params, &ids, workgroups);
+    let outcome = engine.submit(&recording).and_then(|()| {
+        ids.iter()
+            .zip(buffers)
+            .map(|(id, words)| block_on(engine.read(*id, 0, words.len())))
+            .collect()
+    });
+    ids.iter().for_each(|id| engine.destroy_buffer(*id));
+    outcome
+}
+
+/// Runs a kernel on the CPU and on the GPU engine from identical buffers and compares every
+/// buffer. Where the shader differs between `UNROLL` 0 and 1, both are run. Without an adapter
+/// this prints a line and is satisfied.
+pub fn compare_kernel<P: Pod>(
+    kernel: &'static Kernel,
+    params: &P,
+    buffers: &[Vec<u32>],
+    workgroups: [u32; 3],
+    tolerance: &Tolerance,
+) -> Result<(), Mismatch> {
+    let expected = run_kernel(&mut Engine::cpu(), kernel, params, buffers, workgroups)?;
+    let source = |unroll| shader::compose(kernel, &[("UNROLL", unroll)]).map_err(EngineError::from);
+    let variants: &[u32] = if source(0)? == source(1)? { &[1] } else { &[1, 0] };
+    for unroll in variants {
+        let overrides = vec![("UNROLL", *unroll)];
+        let Some(mut gpu) = gpu_engine_with(GpuOptions { overrides, ..Default::default() }) else {
+            return Ok(());
+        };
+        let found = run_kernel(&mut gpu, kernel, params, buffers, workgroups)?;
+        compare_outputs(kernel, &expected, &found, tolerance)?;
+    }
+    Ok(())
+}
+
+/// Compares two engines' buffers.
+pub fn compare_outputs(
+    kernel: &Kernel,
+    expected: &[Vec<u32>],
+    found: &[Vec<u32>],
+    tolerance: &Tolerance,
+) -> Result<(), Mismatch> {
+    let bindings = kernel.bindings.len();
+    if [expected.len(), found.len(), tolerance.0.len()].iter().any(|n| *n != bindings) {
+        let tolerances = tolerance.0.len();
+        return Err(Mismatch::Count { expected: bindings, buffers: found.len(), tolerances });
+    }
+    for (i, compare) in tolerance.0.iter().enumerate() {
+        let pairs = || expected[i].iter().zip(&found[i]).enumerate();
+        let differs = |(a, b): (&u32, &u32)| !within(*compare, *a, *b);
+        let first = pairs().find(|(_, pair)| differs(*pair));
+        let count = pairs().filter(|(_, pair)| differs(*pair)).count();
+        if let Some((index, (a, b))) = first {
+            return Err(Mismatch::Word {
+                kernel: kernel.name,
+                binding: kernel.bindings[i].name,
+                index,
+                expected: show(*compare, *a),
+                found: show(*compare, *b),
+                count,
+            });
+        }
+    }
+    Ok(())
+}
+
+fn within(compare: Compare, a: u32, b: u32) -> bool {
+    match compare {
+        _ if a == b => true,
+        Compare::U32 => false,
+        Compare::I32 { quanta } => (a as i32).abs_diff(b as i32) <= quanta,
+        Compare::F32 { absolute, relative } => {
+            let (a, b) = (f32::from_bits(a), f32::from_bits(b));
+            let allowed = absolute + relative * a.abs().max(b.abs());
+            (a - b).abs() <= allowed && allowed.is_finite() || a.is_nan() && b.is_nan()
+        }
+    }
+}
+
+fn show(compare: Compare, word: u32) -> String {
+    match compare {
+        Compare::U32 => format!("{word:#010x}"),
+        Compare::I32 { .. } => format!("{}", word as i32),
+        Compare::F32 { .. } => format!("{:e}", f32::from_bits(word)),
+    }
+}
+
+/// The bits of floats.
+pub fn f32_words(values: impl IntoIterator<Item = f32>) -> Vec<u32> {
+    values.into_iter().map(f32::to_bits).collect()
+}
+
+/// The bits of signed integers.
+pub fn i32_words(values: impl IntoIterator<Item = i32>) -> Vec<u32> {
+    values.into_iter().map(|value| value as u32).collect()
+}
+
+/// A small deterministic generator for test data (SplitMix64).
+pub struct TestRandom(pub u64);
+
+impl TestRandom {
+    /// 32 random bits.
+    pub fn bits(&mut self) -> u32 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (z >> 32) as u32
+    }
+
+    /// Uniform in \[low, high).
+    pub fn uniform(&mut self, low: f32, high: f32) -> f32 {
+        low + (high - low) * (self.bits() >> 8) as f32 / (1 << 24) as f32
+    }
+}

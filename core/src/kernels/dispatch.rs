@@ -1,0 +1,152 @@
+//! What a kernel's Rust twin sees of a dispatch.
+use alloc::vec::Vec;
+use bytemuck::Pod;
+use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+/// A bound buffer.
+#[derive(Copy, Clone, Debug)]
+pub enum CpuBinding<'a> {
+    /// Bound for reading.
+    Read(&'a [u32]),
+    /// Bound for reading and writing; workgroups run in parallel, hence atomics.
+    ReadWrite(&'a [AtomicU32]),
+}
+
+/// One dispatch of a kernel on the CPU engine.
+pub struct CpuDispatch<'a> {
+    /// Workgroups in x, y and z.
+    pub workgroups: [u32; 3],
+    /// Invocations a workgroup.
+    pub workgroup_size: u32,
+    params: &'a [u32],
+    bindings: Vec<CpuBinding<'a>>,
+}
+
+impl<'a> CpuDispatch<'a> {
+    /// A dispatch with the words of its parameter struct and its buffers in binding order.
+    pub fn new(
+        workgroups: [u32; 3],
+        workgroup_size: u32,
+        params: &'a [u32],
+        bindings: Vec<CpuBinding<'a>>,
+    ) -> Self {
+        Self { workgroups, workgroup_size, params, bindings }
+    }
+
+    /// The parameter struct. A struct of another size than recorded (a mistake in the kernel's
+    /// registration) reads as zeros.
+    pub fn params<P: Pod>(&self) -> P {
+        let bytes: &[u8] = bytemuck::cast_slice(self.params);
+        debug_assert!(bytes.len() >= size_of::<P>(), "parameter struct of another kernel");
+        bytes.get(..size_of::<P>()).map_or_else(P::zeroed, bytemuck::pod_read_unaligned)
+    }
+
+    fn read<T: Pod>(&self, i: usize) -> &'a [T] {
+        match self.bindings.get(i) {
+            Some(CpuBinding::Read(words)) => bytemuck::try_cast_slice(words).unwrap_or(&[]),
+            other => {
+                debug_assert!(false, "binding {i} is not bound for reading: {}", other.is_some());
+                &[]
+            }
+        }
+    }
+
+    /// Binding `i` (counted from 0) as u32, bound for reading only.
+    pub fn read_u32(&self, i: usize) -> &'a [u32] {
+        self.read(i)
+    }
+
+    /// Binding `i` as i32, bound for reading only.
+    pub fn read_i32(&self, i: usize) -> &'a [i32] {
+        self.read(i)
+    }
+
+    /// Binding `i` as f32, bound for reading only.
+    pub fn read_f32(&self, i: usize) -> &'a [f32] {
+        self.read(i)
+    }
+
+    /// Binding `i`, bound for reading and writing.
+    pub fn write(&self, i: usize) -> &'a [AtomicU32] {
+        match self.bindings.get(i) {
+            Some(CpuBinding::ReadWrite(words)) => words,
+            other => {
+                debug_assert!(false, "binding {i} is not bound for writing: {}", other.is_some());
+                &[]
+            }
+        }
+    }
+
+    /// Calls `body` with every linear workgroup id x + count_x * (y + count_y * z), in parallel
+    /// and in any order with `std`.
+    pub fn for_each_workgroup(&self, body: impl Fn(u32) + Sync + Send) {
+        let count = self.workgroups.iter().product::<u32>();
+        #[cfg(feature = "std")]
+        {
+            use rayon::prelude::*;
+            (0..count).into_par_iter().for_each(body);
+        }
+        #[cfg(not(feature = "std"))]
+        (0..count).for_each(body);
+    }
+
+    /// Calls `body` with every linear invocation id (workgroup id times size plus local id);
+    /// parallel over workgroups. `body` checks the id against the problem's size.
+    pub fn for_each_invocation(&self, body: impl Fn(usize) + Sync + Send) {
+        let size = self.workgroup_size as usize;
+        self.for_each_workgroup(|workgroup| {
+            let first = workgroup as usize * size;
+            for id in first..first + size {
+                body(id);
+            }
+        });
+    }
+}
+
+/// The f32 in a word.
+#[inline(always)]
+pub fn load_f32(word: &AtomicU32) -> f32 {
+    f32::from_bits(word.load(Relaxed))
+}
+
+/// Stores an f32.
+#[inline(always)]
+pub fn store_f32(word: &AtomicU32, value: f32) {
+    word.store(value.to_bits(), Relaxed);
+}
+
+/// The i32 in a word.
+#[inline(always)]
+pub fn load_i32(word: &AtomicU32) -> i32 {
+    word.load(Relaxed) as i32
+}
+
+/// Stores an i32.
+#[inline(always)]
+pub fn store_i32(word: &AtomicU32, value: i32) {
+    word.store(value as u32, Relaxed);
+}
+
+/// The u32 in a word.
+#[inline(always)]
+pub fn load_u32(word: &AtomicU32) -> u32 {
+    word.load(Relaxed)
+}
+
+/// Stores a u32.
+#[inline(always)]
+pub fn store_u32(word: &AtomicU32, value: u32) {
+    word.store(value, Relaxed);
+}
+
+/// Adds with wrap-around and returns the value before, as WGSL's `atomicAdd` on `atomic<i32>`.
+#[inline(always)]
+pub fn add_i32(word: &AtomicU32, value: i32) -> i32 {
+    word.fetch_add(value as u32, Relaxed) as i32
+}
+
+/// Sets bits and returns the value before, as WGSL's `atomicOr`.
+#[inline(always)]
+pub fn or_u32(word: &AtomicU32, bits: u32) -> u32 {
+    word.fetch_or(bits, Relaxed)
+}
