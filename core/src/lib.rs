@@ -13,8 +13,6 @@ pub mod engine;
 pub mod frame;
 pub mod mesh;
 pub mod metrics;
-pub mod engine;
-pub mod frame;
 pub mod kernels;
 pub mod layout;
 pub mod pose;
