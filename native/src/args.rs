@@ -62,7 +62,7 @@ pub enum Command {
         Examples:\n    \
         mte-slam run data/room0\n    \
         mte-slam run data/rgbd_dataset_freiburg1_desk --preset tum --scale 0.5\n    \
-        mte-slam run data/room0 --frames 100 --set tracking.iterations=20 --seed 7 --out out/try"
+        mte-slam run data/room0 --frames 100 --set mapping.iterations=20 --seed 7 --out out/try"
     )]
     Run(RunArgs),
     /// Compute the figures of an output folder again, from its files and the recording alone
@@ -161,7 +161,7 @@ pub struct ConfigArgs {
     pub tracker: Option<TrackerChoice>,
     /// Seed of every random choice; one seed on one adapter gives identical files.
     #[arg(long, value_name = "S", help_heading = "Configuration")]
-    pub seed: Option<u64>,
+    pub seed: Option<u32>,
 }
 
 /// What is written where.
@@ -176,9 +176,9 @@ pub struct OutputArgs {
     /// Render and evaluate every K-th frame; 0 renders none.
     #[arg(long, value_name = "K", default_value_t = 10, help_heading = "Output")]
     pub render_every: usize,
-    /// Voxel size of the mesh in metres; `mte-slam mesh` can refine it later.
-    #[arg(long, value_name = "M", default_value_t = 0.02, value_parser = positive_metres, help_heading = "Output")]
-    pub mesh_resolution: f64,
+    /// Voxel size of the mesh in metres; `mte-slam mesh` can refine it later [default: by preset].
+    #[arg(long, value_name = "M", value_parser = positive_metres, help_heading = "Output")]
+    pub mesh_resolution: Option<f64>,
     /// Do not extract a mesh.
     #[arg(long, help_heading = "Output")]
     pub no_mesh: bool,
@@ -270,9 +270,25 @@ pub struct EvalArgs {
     /// Layout of the recording's files, instead of recognising it.
     #[arg(long, value_name = "LAYOUT")]
     pub layout: Option<String>,
+    /// Which parts of the two meshes are compared.
+    #[arg(long, value_enum, default_value_t, value_name = "PROTOCOL")]
+    pub cull: CullChoice,
+    /// Align our mesh to the true one first (point-to-point ICP, 0.1 m), as the peers do.
+    #[arg(long)]
+    pub icp: bool,
     /// Labels to compare with: `dataset` or a folder of label images.
     #[arg(long, value_name = "dataset|DIR", default_value = "dataset")]
     pub labels: String,
+}
+
+/// Which parts of a mesh count as observed; both meshes are culled alike.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum CullChoice {
+    /// In a frame, and no deeper than its measured depth plus 6 cm (ESLAM).
+    #[default]
+    Eslam,
+    /// In a frame's frustum, and not hidden by the mesh itself by more than 3 cm (Co-SLAM).
+    Coslam,
 }
 
 /// `mesh`.

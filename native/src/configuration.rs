@@ -51,13 +51,10 @@ pub fn effective(args: &ConfigArgs, default_preset: &str) -> Result<Effective> {
         set(&mut table, "tracking.tracker", Value::String(name.to_owned()), "--tracker")?;
     }
     if let Some(seed) = args.seed {
-        let Ok(seed) = i64::try_from(seed) else {
-            usage!("--seed: found {seed}, expected at most {}", i64::MAX);
-        };
-        set(&mut table, "seed", Value::Integer(seed), "--seed")?;
+        set(&mut table, "seed", Value::Integer(seed.into()), "--seed")?;
     }
     let config = from_table(&table).map_err(|e| UsageError(format!("configuration: {e}")))?;
-    config.validate().map_err(|e| UsageError(format!("configuration: {e}")))?;
+    config.validate().map_err(|e| UsageError(e.to_string()))?;
     Ok(Effective { preset, config })
 }
 

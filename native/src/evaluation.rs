@@ -1,17 +1,18 @@
 //! The figures of a run, by the core's metrics.
 use crate::output::{
-    metrics::{MeshFigures, Metrics, RenderRecord, SemanticFigures},
+    metrics::{Metrics, RenderRecord, SemanticFigures},
     pictures::unlabelled_id,
 };
 use anyhow::{Context, Result, bail};
 use mte_slam_core::{
     frame::{Frame, SequenceInfo},
-    mesh::{self, Mesh},
+    mesh::{self, CullProtocol, Keep, Mesh, Visibility},
     metrics::{
-        AteReport, ConfusionMatrix, DepthMeter, PosePair, PsnrMeter, TrajectoryError, align_rigid,
-        ate,
+        self, AteReport, ConfusionMatrix, DepthMeter, PosePair, PsnrMeter, SurfaceOptions,
+        SurfaceReport, TrajectoryError, align_rigid, ate, evaluate_surface,
     },
     pose::Pose,
+    sequence::Sequence,
     slam::{PoseEstimate, View},
 };
 use std::path::Path;
@@ -148,12 +149,54 @@ impl MeshTruth {
     }
 }
 
-/// Compare a mesh with the true one, over what the true poses' views observed.
+/// ESLAM's culling: in a frame, and no deeper than its measured depth plus the truncation.
+pub const CULL_ESLAM: CullProtocol = CullProtocol::SensorDepth { truncation_m: 0.06 };
+/// Co-SLAM's culling: in a frame's frustum, and not hidden in a rendering of the mesh itself.
+pub const CULL_COSLAM: CullProtocol = CullProtocol::RenderedDepth { tolerance_m: 0.03 };
+/// Frames that decide what was observed; more of a long sequence add little.
+const CULLING_VIEWS: usize = 200;
+
+/// Compare a mesh with the true one, both culled to what frames at true poses observed. `icp`
+/// aligns ours to the true one first.
 pub fn mesh(
-    _mesh: Mesh,
-    _truth: MeshTruth,
-    _poses: &[Option<Pose>],
-    _info: &SequenceInfo,
-) -> Result<MeshFigures> {
-    bail!("not compared yet")
+    mut ours: Mesh,
+    truth: MeshTruth,
+    sequence: &mut dyn Sequence,
+    protocol: CullProtocol,
+    icp: bool,
+) -> Result<SurfaceReport> {
+    let info = sequence.info().clone();
+    let mut true_mesh = truth.mesh;
+    let mut seen_of_ours = Visibility::new(&ours);
+    let mut seen_of_truth = Visibility::new(&true_mesh);
+    let stride = info.frames.div_ceil(CULLING_VIEWS).max(1);
+    let mut views = 0;
+    for index in (0..info.frames).step_by(stride) {
+        let Some(world_from_camera) = sequence.truth(index) else { continue };
+        let frame = sequence.frame(index)?;
+        let view = mesh::View {
+            camera: &info.camera,
+            world_from_camera,
+            depth: &frame.depth,
+            depth_unit_m: info.depth_unit_m,
+        };
+        seen_of_ours.add_view(&ours, &view, protocol);
+        seen_of_truth.add_view(&true_mesh, &view, protocol);
+        views += 1;
+    }
+    if views == 0 {
+        bail!("no frame has a true pose, so what was observed is not known");
+    }
+    mesh::cull(&mut ours, &seen_of_ours, Keep::AnySeen);
+    mesh::cull(&mut true_mesh, &seen_of_truth, Keep::AnySeen);
+    let options = SurfaceOptions::default();
+    if icp {
+        let aligned = metrics::icp(&ours, &true_mesh, 0.1, options.seed)?;
+        ours.transform(&aligned);
+    }
+    let mut report = evaluate_surface(&ours, &true_mesh, &options)?;
+    let alignment = if icp { "after ICP" } else { "no alignment" };
+    report.protocol =
+        format!("{}; {} in {views} views; {alignment}", report.protocol, protocol.name());
+    Ok(report)
 }

@@ -21,6 +21,8 @@ use glam::DVec3;
 use mte_slam_core::{
     classes::ClassTable,
     frame::SequenceInfo,
+    mesh::Mesh,
+    pose::Pose,
     sequence::Sequence,
     slam::{FrameReport, PoseEstimate, Slam, TrackingStatus, View},
 };
@@ -85,7 +87,28 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
     write_trajectory(&folder, sequence.as_ref(), &estimates, &truth, &mut metrics)?;
     let scores = render_views(&mut slam, sequence.as_mut(), &folder, &estimates, output, screen)?;
     scores.report(&mut metrics);
-    make_mesh(&mut slam, &folder, &info, output, job.truth_mesh, &truth, &mut metrics, screen)?;
+    if output.no_mesh {
+        metrics.absent.insert("mesh", "--no-mesh was given".to_owned());
+    } else {
+        let resolution = output.mesh_resolution.unwrap_or(effective.config.mesh.resolution_m);
+        let mesh = extract_mesh(&mut slam, resolution, screen)?;
+        meshes::write(&mesh, &info.classes, &mut |name, bytes| folder.write(name, bytes))?;
+        match job.truth_mesh {
+            Ok(true_mesh) => {
+                screen.note("comparing the mesh with the true one");
+                let protocol = evaluation::CULL_ESLAM;
+                match evaluation::mesh(mesh, true_mesh, sequence.as_mut(), protocol, false) {
+                    Ok(report) => metrics.mesh = Some(report),
+                    Err(reason) => {
+                        metrics.absent.insert("mesh", format!("{reason:#}"));
+                    }
+                }
+            }
+            Err(reason) => {
+                metrics.absent.insert("mesh", reason);
+            }
+        }
+    }
 
     let mut saved = slam.checkpoint().context("the map cannot be saved")?;
     checkpoint::describe(&mut saved, &info)?;
@@ -161,7 +184,7 @@ fn write_trajectory(
     folder: &OutputFolder,
     sequence: &dyn Sequence,
     estimates: &[PoseEstimate],
-    truth: &[Option<mte_slam_core::pose::Pose>],
+    truth: &[Option<Pose>],
     metrics: &mut Metrics,
 ) -> Result<()> {
     let text = write_tum(estimates.iter().map(|e| (e.time_s, e.world_from_camera)));
@@ -267,42 +290,15 @@ pub fn write_view(
     Ok(())
 }
 
-fn make_mesh(
-    slam: &mut Slam,
-    folder: &OutputFolder,
-    info: &SequenceInfo,
-    output: &OutputArgs,
-    truth_mesh: Result<MeshTruth, String>,
-    truth: &[Option<mte_slam_core::pose::Pose>],
-    metrics: &mut Metrics,
-    screen: Screen,
-) -> Result<()> {
-    if output.no_mesh {
-        metrics.absent.insert("mesh", "--no-mesh was given".to_owned());
-        return Ok(());
-    }
+/// The mesh of the map, with progress.
+pub fn extract_mesh(slam: &mut Slam, resolution_m: f64, screen: Screen) -> Result<Mesh> {
     let mut progress = screen.progress("meshing", 100);
-    let mesh = block_on(slam.extract_mesh(output.mesh_resolution, &mut |part| {
+    let mesh = block_on(slam.extract_mesh(resolution_m, &mut |part| {
         progress.set((part * 100.0) as u64, String::new);
     }))
     .context("the mesh cannot be extracted")?;
     progress.finish();
-    meshes::write(&mesh, &info.classes, &mut |name, bytes| folder.write(name, bytes))?;
-    match truth_mesh {
-        Ok(true_mesh) => {
-            screen.note("comparing the mesh with the true one");
-            match evaluation::mesh(mesh, true_mesh, truth, info) {
-                Ok(figures) => metrics.mesh = Some(figures),
-                Err(reason) => {
-                    metrics.absent.insert("mesh", format!("{reason:#}"));
-                }
-            }
-        }
-        Err(reason) => {
-            metrics.absent.insert("mesh", reason);
-        }
-    }
-    Ok(())
+    Ok(mesh)
 }
 
 /// What was read, for metrics.json.

@@ -84,17 +84,19 @@ pub fn config_file(config: &Config, run: &RunRecord) -> Result<String> {
     ))
 }
 
-/// The `[run]` table of an output folder's config.toml.
-pub fn read_run(out: &Path) -> Result<RunRecord> {
+/// The `[run]` table of an output folder's config.toml, `None` without the file.
+pub fn read_run(out: &Path) -> Result<Option<RunRecord>> {
     #[derive(Deserialize)]
     struct File {
         run: RunRecord,
     }
     let path = out.join("config.toml");
-    let text = std::fs::read_to_string(&path).with_context(|| {
-        format!("{}: cannot be read; expected the output folder of a run", path.display())
-    })?;
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let text = std::fs::read_to_string(&path)
+        .with_context(|| format!("{}: cannot be read", path.display()))?;
     let file: File = toml::from_str(&text)
         .with_context(|| format!("{}: found no valid [run] table", path.display()))?;
-    Ok(file.run)
+    Ok(Some(file.run))
 }

@@ -7,12 +7,13 @@ use crate::{
     screen::Screen,
 };
 use anyhow::Result;
+use mte_slam_core::sequence::Sequence;
 use std::path::Path;
 
 /// Run SLAM on the built-in sequence.
 pub fn run(args: &DemoArgs, screen: Screen) -> Result<()> {
     let effective = configuration::effective(&args.config, "fast")?;
-    let sequence = input::built_in(args.frames, args.width)?;
+    let sequence = input::built_in(args.frames, args.width);
     let record = RunRecord {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         preset: effective.preset.clone(),
@@ -22,9 +23,13 @@ pub fn run(args: &DemoArgs, screen: Screen) -> Result<()> {
         ..RunRecord::default()
     };
     let default_out = Path::new("out").join(format!("demo-{}", effective.preset));
-    let truth_mesh = input::built_in_mesh();
+    let truth_mesh = if args.output.no_mesh {
+        Err(String::new())
+    } else {
+        Ok(input::true_mesh(sequence.ground_truth_mesh()))
+    };
     let job = Job {
-        sequence,
+        sequence: Box::new(sequence),
         record,
         effective,
         engine: &args.engine,

@@ -3,6 +3,7 @@ use crate::{
     args::MeshArgs,
     engine,
     output::{checkpoint, folder::replace_file, meshes},
+    pipeline::extract_mesh,
     screen::Screen,
 };
 use anyhow::{Context, Result};
@@ -17,12 +18,7 @@ pub fn run(args: &MeshArgs, screen: Screen) -> Result<()> {
     screen.note(&format!("{}: {}", described.name, chosen.note));
     let mut slam = block_on(Slam::restore(chosen.engine, &saved))
         .with_context(|| format!("{}: the map cannot be restored", args.out.display()))?;
-    let mut progress = screen.progress("meshing", 100);
-    let mesh = block_on(slam.extract_mesh(args.resolution, &mut |part| {
-        progress.set((part * 100.0) as u64, String::new);
-    }))
-    .context("the mesh cannot be extracted")?;
-    progress.finish();
+    let mesh = extract_mesh(&mut slam, args.resolution, screen)?;
     let mut names = Vec::new();
     meshes::write(&mesh, &described.classes, &mut |name, bytes| {
         names.push(args.out.join(name).display().to_string());

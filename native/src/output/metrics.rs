@@ -1,7 +1,7 @@
 //! `metrics.json`: every figure with its unit in the key and its protocol beside it, and the table
 //! that people read at the end of a run.
 use super::timings::Spread;
-use mte_slam_core::metrics::{AteReport, DepthReport, PsnrReport, SemanticReport};
+use mte_slam_core::metrics::{AteReport, DepthReport, PsnrReport, SemanticReport, SurfaceReport};
 use serde::Serialize;
 use std::{collections::BTreeMap, fmt::Write};
 
@@ -41,7 +41,7 @@ pub struct Metrics {
     pub semantics: Option<SemanticFigures>,
     /// Mesh against the true mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub mesh: Option<MeshFigures>,
+    pub mesh: Option<SurfaceReport>,
     /// Time a frame.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<TimeFigures>,
@@ -124,19 +124,6 @@ pub struct RenderRecord {
     pub unlabelled_id: u16,
 }
 
-/// Mesh figures.
-#[derive(Debug, Clone, Serialize)]
-pub struct MeshFigures {
-    /// What is compared how.
-    pub protocol: String,
-    /// Mean distance from our surface to the true one (point to surface).
-    pub accuracy_cm: f64,
-    /// Mean distance from the true surface to ours (point to surface).
-    pub completion_cm: f64,
-    /// True surface with ours within 5 cm.
-    pub completion_ratio_5cm_percent: f64,
-}
-
 /// Time a frame.
 #[derive(Debug, Clone, Serialize)]
 pub struct TimeFigures {
@@ -197,10 +184,15 @@ impl Metrics {
             row("pixel accuracy", format!("{:.2} %", s.report.pixel_accuracy_percent), "");
         }
         if let Some(m) = &self.mesh {
-            row("mesh accuracy", format!("{:.2} cm", m.accuracy_cm), &m.protocol);
-            row("mesh completion", format!("{:.2} cm", m.completion_cm), "");
-            let ratio = format!("{:.1} %", m.completion_ratio_5cm_percent);
-            row("completion ratio < 5 cm", ratio, "");
+            let s = &m.point_to_surface;
+            row("mesh accuracy", format!("{:.2} cm", s.accuracy_cm), &m.protocol);
+            row("mesh completion", format!("{:.2} cm", s.completion_cm), "");
+            let ratio = format!("{:.1} %", s.completion_ratio_percent);
+            row(&format!("completion ratio < {:.0} cm", m.threshold_cm), ratio, "");
+            let p = &m.point_to_point;
+            let peers = format!("{:.2}, {:.2} cm", p.accuracy_cm, p.completion_cm);
+            row("the same point to point", peers, "");
+            row("floor of point to point", format!("{:.2} cm", m.sampling_floor_cm), "");
         }
         if let Some(t) = &self.time {
             let of = |s: &Spread| format!("{:.3} s (p95 {:.3})", s.median_s, s.p95_s);
