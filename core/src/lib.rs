@@ -13,6 +13,8 @@ pub mod engine;
 pub mod frame;
 pub mod kernels;
 pub mod layout;
+pub mod mesh;
+pub mod metrics;
 pub mod pose;
 pub mod recording;
 pub mod sequence;

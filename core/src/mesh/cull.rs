@@ -1,0 +1,207 @@
+//! Which part of a mesh was observed. Two protocols of the field; both meshes of a comparison
+//! must be culled alike.
+use super::{Mesh, parallel, rasterise, to_dvec3};
+use crate::{camera::Camera, pose::Pose};
+use alloc::{vec, vec::Vec};
+
+/// One image that observed the scene.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// The image's camera.
+    pub camera: &'a Camera,
+    /// The camera's pose in the frame of the mesh.
+    pub world_from_camera: Pose,
+    /// Sensor depth along z, row-major, 0 invalid; empty for a virtual view.
+    pub depth: &'a [u16],
+    /// Metres per unit of `depth`.
+    pub depth_unit_m: f64,
+}
+
+impl View<'_> {
+    /// Depth along z \[m\] of a world point and the index of the pixel that it falls on, if any.
+    fn pixel(&self, camera_from_world: &Pose, world: [f32; 3]) -> Option<(f64, usize)> {
+        let p = camera_from_world.transform_point(to_dvec3(world));
+        let uv = self.camera.project(p)?;
+        let (u, v) = (uv.x + 0.5, uv.y + 0.5);
+        let (w, h) = (f64::from(self.camera.width), f64::from(self.camera.height));
+        // Written so that NaN fails.
+        let inside = u >= 0.0 && v >= 0.0 && u < w && v < h;
+        inside.then(|| (p.z, v as usize * self.camera.width as usize + u as usize))
+    }
+}
+
+/// What counts as observed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CullProtocol {
+    /// ESLAM's: a vertex falls on a pixel with sensor depth, no deeper than that depth plus the
+    /// truncation \[m\] (0.06). Pixels without sensor depth observe nothing.
+    SensorDepth {
+        /// How far behind the measurement a vertex may lie \[m\].
+        truncation_m: f64,
+    },
+    /// Co-SLAM's: a vertex is in a real view's frustum, and a vertex is visible in a real or virtual
+    /// view, that is, no deeper than a rendering of the mesh itself plus the tolerance \[m\] (0.03).
+    RenderedDepth {
+        /// How far behind the rendered surface a vertex may lie \[m\].
+        tolerance_m: f64,
+    },
+}
+
+impl CullProtocol {
+    /// The name that figures culled in this way carry.
+    pub fn name(&self) -> &'static str {
+        match self {
+            CullProtocol::SensorDepth { .. } => "culled to frustum and sensor depth (ESLAM)",
+            CullProtocol::RenderedDepth { .. } => "culled to frustum and visibility (Co-SLAM)",
+        }
+    }
+}
+
+/// How many corners of a triangle must be observed for it to stay.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Keep {
+    /// At least one: drops triangles with all corners unseen (both protocols' usual rule).
+    AnySeen,
+    /// All three: drops triangles with any corner unseen.
+    AllSeen,
+}
+
+/// What the views so far have seen of a mesh's vertices. Views can be added one at a time, so a
+/// sequence need not be in memory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Visibility {
+    /// A vertex is in a real view's frustum (`RenderedDepth`), or observed (`SensorDepth`).
+    pub in_view: Vec<bool>,
+    /// A vertex is not hidden by the mesh in some view (`RenderedDepth`), or observed.
+    pub unhidden: Vec<bool>,
+}
+
+impl Visibility {
+    /// Nothing seen yet of a mesh's vertices.
+    pub fn new(mesh: &Mesh) -> Visibility {
+        let unseen = vec![false; mesh.positions.len()];
+        Visibility { in_view: unseen.clone(), unhidden: unseen }
+    }
+
+    /// Add what one view sees. A view without depth is virtual: it observes nothing under
+    /// `SensorDepth`, and only helps visibility under `RenderedDepth`. Depth of a wrong size counts
+    /// as missing where it has no pixel.
+    pub fn add_view(&mut self, mesh: &Mesh, view: &View<'_>, protocol: CullProtocol) {
+        let camera_from_world = view.world_from_camera.inverse();
+        let place = |i: usize| view.pixel(&camera_from_world, mesh.positions[i]);
+        let n = mesh.positions.len();
+        // Two bits a vertex: in view, unhidden.
+        let seen: Vec<(bool, bool)> = match protocol {
+            CullProtocol::SensorDepth { truncation_m } => parallel::map(n, |i| {
+                let observed = place(i).is_some_and(|(z, pixel)| {
+                    let depth = view.depth.get(pixel).map_or(0.0, |&d| f64::from(d));
+                    depth > 0.0 && z < depth * view.depth_unit_m + truncation_m
+                });
+                (observed, observed)
+            }),
+            CullProtocol::RenderedDepth { tolerance_m } => {
+                let rendered = rasterise(mesh, view.camera, &view.world_from_camera);
+                parallel::map(n, |i| match place(i) {
+                    Some((z, pixel)) => {
+                        let depth = f64::from(rendered.depth_m[pixel]);
+                        (!view.depth.is_empty(), depth == 0.0 || z < depth + tolerance_m)
+                    }
+                    None => (false, false),
+                })
+            }
+        };
+        for (i, (in_view, unhidden)) in seen.into_iter().enumerate() {
+            self.in_view[i] |= in_view;
+            self.unhidden[i] |= unhidden;
+        }
+    }
+}
+
+/// Keep the triangles of which enough corners are in view and enough are not hidden; drop unused
+/// vertices.
+pub fn cull(mesh: &mut Mesh, visibility: &Visibility, keep: Keep) {
+    let triangles = core::mem::take(&mut mesh.triangles);
+    let enough = |t: &[u32; 3], seen: &[bool]| match keep {
+        Keep::AnySeen => t.iter().any(|&i| seen[i as usize]),
+        Keep::AllSeen => t.iter().all(|&i| seen[i as usize]),
+    };
+    let stays = |t: &[u32; 3]| enough(t, &visibility.in_view) && enough(t, &visibility.unhidden);
+    mesh.triangles = triangles.into_iter().filter(stays).collect();
+    mesh.drop_unused_vertices();
+}
+
+/// The part of a mesh that some views observed.
+pub fn observed_part<'a>(
+    mesh: &Mesh,
+    views: impl IntoIterator<Item = View<'a>>,
+    protocol: CullProtocol,
+    keep: Keep,
+) -> Mesh {
+    let mut visibility = Visibility::new(mesh);
+    for view in views {
+        visibility.add_view(mesh, &view, protocol);
+    }
+    let mut part = mesh.clone();
+    cull(&mut part, &visibility, keep);
+    part
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::test_shapes::square;
+    use core::f64::consts::PI;
+    use glam::DVec3;
+
+    const CAMERA: Camera = Camera { width: 40, height: 40, fx: 40.0, fy: 40.0, cx: 19.5, cy: 19.5 };
+
+    /// Two parallel 4 m squares, 1 and 2 m before the camera, centred.
+    fn two_walls() -> Mesh {
+        let mut mesh = square(40, 4.0, 1.0);
+        let far = square(40, 4.0, 2.0);
+        let offset = mesh.positions.len() as u32;
+        mesh.positions.extend(far.positions);
+        mesh.triangles.extend(far.triangles.iter().map(|t| t.map(|i| i + offset)));
+        mesh.transform(&Pose { translation: DVec3::new(-2.0, -2.0, 0.0), ..Pose::IDENTITY });
+        mesh
+    }
+
+    fn view(depth: &[u16]) -> View<'_> {
+        View { camera: &CAMERA, world_from_camera: Pose::IDENTITY, depth, depth_unit_m: 1e-3 }
+    }
+
+    #[test]
+    fn sensor_depth_keeps_what_was_measured() {
+        let mesh = two_walls();
+        let protocol = CullProtocol::SensorDepth { truncation_m: 0.06 };
+        let mut depth = vec![1000u16; 1600];
+        depth[..800].fill(0); // no measurement in the upper half
+        let part = observed_part(&mesh, [view(&depth)], protocol, Keep::AllSeen);
+        assert!(!part.triangles.is_empty());
+        for p in &part.positions {
+            assert!(p[2] == 1.0 && p[0].abs() <= 0.51 && p[1] >= -0.01 && p[1] <= 0.51, "{p:?}");
+        }
+        let more = observed_part(&mesh, [view(&depth)], protocol, Keep::AnySeen);
+        assert!(more.triangles.len() > part.triangles.len());
+        depth.fill(2500);
+        let both = observed_part(&mesh, [view(&depth)], protocol, Keep::AllSeen);
+        assert!(both.positions.iter().any(|p| p[2] == 2.0));
+        // Truncated depth and a virtual view: no panic, nothing seen.
+        assert!(observed_part(&mesh, [view(&[])], protocol, Keep::AnySeen).positions.is_empty());
+    }
+
+    #[test]
+    fn rendered_depth_drops_what_is_hidden() {
+        let mesh = two_walls();
+        let protocol = CullProtocol::RenderedDepth { tolerance_m: 0.03 };
+        let depth = vec![1000u16; 1600];
+        let part = observed_part(&mesh, [view(&depth)], protocol, Keep::AllSeen);
+        assert!(part.positions.len() > 50 && part.positions.iter().all(|p| p[2] == 1.0));
+        // A virtual view from behind reveals the far wall where the real view's frustum has it.
+        let mut behind = view(&[]);
+        behind.world_from_camera = Pose::from_twist(&[0.0, 0.0, 4.0, 0.0, PI, 0.0]);
+        let both = observed_part(&mesh, [view(&depth), behind], protocol, Keep::AllSeen);
+        assert!(both.positions.iter().any(|p| p[2] == 2.0));
+        assert!(observed_part(&mesh, [behind], protocol, Keep::AnySeen).positions.is_empty());
+    }
+}

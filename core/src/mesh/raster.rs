@@ -1,0 +1,199 @@
+//! A small z-buffer rasteriser: what a camera would see of a mesh. Deterministic: the nearest
+//! surface wins, the lower triangle index at equal depth.
+use super::{Mesh, parallel, to_dvec3};
+use crate::{camera::Camera, pose::Pose};
+use alloc::vec::Vec;
+use glam::DVec3;
+#[cfg(not(feature = "std"))]
+use num_traits::Float as _;
+
+/// Triangles are cut at this depth \[m\].
+const NEAR_M: f64 = 0.01;
+/// Rows drawn by one task.
+const BAND_ROWS: usize = 32;
+/// Triangles set up by one task.
+const CHUNK: usize = 16_384;
+
+/// A rendered view, row-major with the camera's size.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Raster {
+    /// Depth along z \[m\], 0 where nothing is seen.
+    pub depth_m: Vec<f32>,
+    /// The triangle seen, `u32::MAX` where there is none.
+    pub triangle: Vec<u32>,
+}
+
+/// A triangle in the image: pixel positions and 1 / depth of the corners.
+struct Projected {
+    corners: [[f32; 3]; 3],
+    triangle: u32,
+}
+
+/// Render a mesh, both sides of its triangles.
+pub fn rasterise(mesh: &Mesh, camera: &Camera, world_from_camera: &Pose) -> Raster {
+    let camera_from_world = world_from_camera.inverse();
+    let points: Vec<[f32; 3]> = parallel::map(mesh.positions.len(), |i| {
+        let p = camera_from_world.transform_point(to_dvec3(mesh.positions[i]));
+        p.to_array().map(|x| x as f32)
+    });
+    let chunks = mesh.triangles.len().div_ceil(CHUNK);
+    let projected: Vec<Vec<Projected>> = parallel::map(chunks, |c| {
+        let mut out = Vec::new();
+        let end = ((c + 1) * CHUNK).min(mesh.triangles.len());
+        for t in c * CHUNK..end {
+            project(mesh.triangles[t].map(|i| points[i as usize]), t as u32, camera, &mut out);
+        }
+        out
+    });
+    let width = camera.width as usize;
+    let mut pixels = alloc::vec![(0f32, u32::MAX); camera.pixels()];
+    parallel::for_chunks(&mut pixels, BAND_ROWS * width, |band, pixels| {
+        for p in projected.iter().flatten() {
+            draw(p, band * BAND_ROWS, width, pixels);
+        }
+    });
+    // The buffer holds 1 / depth.
+    let depth = |&(inverse, _): &(f32, u32)| if inverse > 0.0 { inverse.recip() } else { 0.0 };
+    Raster {
+        depth_m: pixels.iter().map(depth).collect(),
+        triangle: pixels.iter().map(|p| p.1).collect(),
+    }
+}
+
+/// Cut at the near plane, project, and keep what can touch the image.
+fn project(corners: [[f32; 3]; 3], triangle: u32, camera: &Camera, out: &mut Vec<Projected>) {
+    // Not `z < near`: a NaN must not pass.
+    let in_front = corners.map(|p| f64::from(p[2]) >= NEAR_M);
+    if !in_front.contains(&true) {
+        return;
+    }
+    let points = corners.map(to_dvec3);
+    let mut polygon: [DVec3; 4] = [DVec3::ZERO; 4];
+    let mut n = 0;
+    for i in 0..3 {
+        let (a, b) = (points[i], points[(i + 1) % 3]);
+        if in_front[i] {
+            polygon[n] = a;
+            n += 1;
+        }
+        if in_front[i] != in_front[(i + 1) % 3] {
+            polygon[n] = a + (b - a) * ((NEAR_M - a.z) / (b.z - a.z));
+            n += 1;
+        }
+    }
+    let image = |p: DVec3| {
+        let (u, v) = (camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy);
+        [u as f32, v as f32, (1.0 / p.z) as f32]
+    };
+    for i in 2..n {
+        let corners = [image(polygon[0]), image(polygon[i - 1]), image(polygon[i])];
+        let outside = |axis: usize, size: u32| {
+            let limit = size as f32 - 1.0;
+            corners.iter().all(|c| c[axis] < 0.0) || corners.iter().all(|c| c[axis] > limit)
+        };
+        let finite = corners.iter().flatten().all(|x| x.is_finite());
+        if finite && !outside(0, camera.width) && !outside(1, camera.height) {
+            out.push(Projected { corners, triangle });
+        }
+    }
+}
+
+/// Draw into rows `first_row..` of the image.
+fn draw(p: &Projected, first_row: usize, width: usize, pixels: &mut [(f32, u32)]) {
+    let rows = pixels.len() / width;
+    let [a, b, c] = p.corners.map(to_dvec3);
+    let range = |axis: usize, first: usize, count: usize| {
+        let low = a[axis].min(b[axis]).min(c[axis]).ceil().max(first as f64);
+        let high = a[axis].max(b[axis]).max(c[axis]).floor().min((first + count) as f64 - 1.0);
+        if low > high { 0..0 } else { low as usize..high as usize + 1 }
+    };
+    let ys = range(1, first_row, rows);
+    if ys.is_empty() {
+        return;
+    }
+    let area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+    let xs = range(0, 0, width);
+    if area == 0.0 || xs.is_empty() {
+        return;
+    }
+    for y in ys {
+        let v = y as f64;
+        for x in xs.clone() {
+            let u = x as f64;
+            // Barycentric coordinates, with room for rounding so that neighbours leave no gaps.
+            let wb = ((u - a.x) * (c.y - a.y) - (v - a.y) * (c.x - a.x)) / area;
+            let wc = ((b.x - a.x) * (v - a.y) - (b.y - a.y) * (u - a.x)) / area;
+            let wa = 1.0 - wb - wc;
+            if wa < -1e-7 || wb < -1e-7 || wc < -1e-7 {
+                continue;
+            }
+            // 1 / depth is linear in the image.
+            let inverse = (wa * a.z + wb * b.z + wc * c.z) as f32;
+            let pixel = &mut pixels[(y - first_row) * width + x];
+            if inverse > pixel.0 || (inverse == pixel.0 && p.triangle < pixel.1) {
+                *pixel = (inverse, p.triangle);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::test_shapes::square;
+
+    const CAMERA: Camera = Camera { width: 80, height: 60, fx: 70.0, fy: 72.0, cx: 39.5, cy: 29.5 };
+
+    /// A camera inside a tilted plane's half space, and the depth of that plane at a pixel.
+    #[test]
+    fn a_tilted_plane_is_exact_and_without_holes() {
+        // 20 m square through the camera's near plane: exercises cutting at the near plane too.
+        let mut mesh = square(7, 20.0, 0.0);
+        mesh.transform(&Pose { translation: DVec3::new(-10.0, -10.0, 0.0), ..Pose::IDENTITY });
+        let pose = Pose::from_twist(&[0.3, -0.2, -1.5, 0.4, 0.7, 0.2]);
+        let image = rasterise(&mesh, &CAMERA, &pose);
+        let mut seen = 0;
+        for v in 0..60 {
+            for u in 0..80 {
+                let ray = pose.transform_vector(CAMERA.back_project(u as f64, v as f64, 1.0));
+                let depth = -pose.translation.z / ray.z;
+                let hit = pose.translation + ray * depth;
+                let found = f64::from(image.depth_m[v * 80 + u]);
+                if depth > 0.0 && hit.abs().max_element() < 9.99 {
+                    assert!((found - depth).abs() < 1e-5 * depth, "{u} {v}: {found} {depth}");
+                    assert_ne!(image.triangle[v * 80 + u], u32::MAX);
+                    seen += 1;
+                } else if depth < 0.0 || hit.abs().max_element() > 10.01 {
+                    assert_eq!((found, image.triangle[v * 80 + u]), (0.0, u32::MAX));
+                }
+            }
+        }
+        assert!(seen > 3000, "{seen}");
+    }
+
+    #[test]
+    fn the_nearer_surface_wins_in_any_order() {
+        let mut mesh = square(2, 4.0, 3.0);
+        let near = square(1, 4.0, 2.0);
+        let offset = mesh.positions.len() as u32;
+        mesh.positions.extend(near.positions);
+        mesh.triangles.extend(near.triangles.iter().map(|t| t.map(|i| i + offset)));
+        let pose = Pose { translation: DVec3::new(2.0, 2.0, 0.0), ..Pose::IDENTITY };
+        let image = rasterise(&mesh, &CAMERA, &pose);
+        assert!(image.depth_m.iter().all(|&d| (d - 2.0).abs() < 1e-6));
+        mesh.triangles.reverse();
+        let reversed = rasterise(&mesh, &CAMERA, &pose);
+        assert_eq!(image.depth_m, reversed.depth_m);
+    }
+
+    #[test]
+    fn bad_vertices_draw_nothing() {
+        let mut mesh = square(1, 4.0, 3.0);
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            mesh.positions[0][2] = bad;
+            mesh.positions[3][0] = bad;
+            let image = rasterise(&mesh, &CAMERA, &Pose::IDENTITY);
+            assert!(image.depth_m.iter().all(|d| *d == 0.0));
+        }
+    }
+}

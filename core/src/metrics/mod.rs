@@ -1,0 +1,42 @@
+//! Evaluation: every figure of a run, each with the name of its protocol. Published tables mix
+//! protocols, so a figure without one means nothing.
+mod bvh;
+mod image;
+mod semantic;
+mod surface;
+mod trajectory;
+
+pub use image::{DepthMeter, DepthReport, MAX_PSNR_DB, PsnrMeter, PsnrReport};
+pub use semantic::{ConfusionMatrix, SemanticReport};
+pub use surface::{
+    SurfaceFigures, SurfaceOptions, SurfaceReport, evaluate_surface, icp, sample_surface,
+};
+pub use trajectory::{
+    Alignment, AteReport, ErrorSummary, PosePair, RpeReport, TrajectoryError, align_rigid, ate, rpe,
+};
+
+/// Why images or meshes cannot be compared.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum MetricsError {
+    /// Two images of a comparison differ in size.
+    #[error("{what}: found {found}, expected {expected}")]
+    Size {
+        /// What was counted.
+        what: &'static str,
+        /// How many there were.
+        found: usize,
+        /// How many there should be.
+        expected: usize,
+    },
+    /// A mesh that no samples can be drawn from.
+    #[error("{mesh} mesh: found {found}, expected a surface with a finite, positive area")]
+    NoSurface {
+        /// `estimated` or `true`.
+        mesh: &'static str,
+        /// What is wrong with it.
+        found: alloc::string::String,
+    },
+    /// The alignment before a comparison failed.
+    #[error("alignment of the meshes: {0}")]
+    Alignment(TrajectoryError),
+}
