@@ -28,7 +28,10 @@ const SAME_STAMP_S: f64 = 1e-5;
 pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
     let out = &args.out;
     if !out.is_dir() {
-        bail!("{}: found no folder of that name, expected the output folder of a run", out.display());
+        bail!(
+            "{}: found no folder of that name, expected the output folder of a run",
+            out.display()
+        );
     }
     let record = record::read_run(out)?.unwrap_or_default();
     let selection = SelectionArgs {
@@ -128,9 +131,8 @@ fn evaluate_renders(
 ) -> Result<()> {
     let info = sequence.info().clone();
     let folder = out.join("renders");
-    let rendered: Vec<usize> = (0..info.frames)
-        .filter(|i| folder.join(format!("{i:06}.color.png")).is_file())
-        .collect();
+    let rendered: Vec<usize> =
+        (0..info.frames).filter(|i| folder.join(format!("{i:06}.color.png")).is_file()).collect();
     let mut scores = ViewScores::new(&info);
     let mut progress = screen.progress("comparing pictures", rendered.len());
     for (i, &index) in rendered.iter().enumerate() {

@@ -85,7 +85,7 @@ pub struct ConfigurationRecord {
     /// Hash of all values (FNV-1a 64 of their TOML).
     pub hash: String,
     /// Seed.
-    pub seed: u64,
+    pub seed: u32,
     /// Tracker.
     pub tracker: String,
 }
