@@ -1,10 +1,165 @@
-//! Constants shared by the kernels' WGSL and Rust sides.
+//! Layouts and constants that shaders and twins share.
+use crate::params;
 
-/// Features a plane cell and level.
-pub const CHANNELS: u32 = 16;
-/// Resolution levels of a feature plane.
-pub const LEVELS: u32 = 2;
+/// Floats of the geometry decoder in the decoder buffer.
+pub const GEOMETRY_FLOATS: usize = 205 * 4;
+/// Floats of the colour and semantic decoders, behind it.
+pub const SURFACE_FLOATS: usize = 693 * 4;
+/// First float of the class head.
+pub const HEAD_FLOATS: usize = GEOMETRY_FLOATS + SURFACE_FLOATS;
+/// Most stratified samples a ray.
+pub const MAX_STRATIFIED: u32 = 128;
+/// Floats a cell of a plane holds.
+pub const CHANNELS: usize = 16;
+/// Floats a ray keeps between the forward and the backward pass.
+pub const RAY_STATE_FLOATS: usize = STATE_END as usize * 4;
+/// Floats a ray has in `ray_out`.
+pub const RAY_OUT_FLOATS: usize = 12;
 
-/// The constants that shaders may name in `${...}`, with their defaults. `UNROLL` is 1 where
-/// shaders may choose unrolled code, and 0 where the compiler is slow and plain loops are better.
-pub const CONSTANTS: &[(&str, u32)] = &[("CHANNELS", CHANNELS), ("LEVELS", LEVELS), ("UNROLL", 1)];
+// Offsets inside a ray's state, in vec4.
+/// Composited appearance features (8).
+pub const STATE_APPEARANCE: u32 = 0;
+/// Composited semantic features (8).
+pub const STATE_SEMANTIC: u32 = 8;
+/// Hidden activations of the colour decoder (8).
+pub const STATE_COLOR_HIDDEN: u32 = 16;
+/// Hidden activations of the semantic decoder (8).
+pub const STATE_SEMANTIC_HIDDEN: u32 = 24;
+/// Semantic feature (4).
+pub const STATE_FEATURE: u32 = 32;
+/// Gradient at the colour's pre-activation (1).
+pub const STATE_COLOR_DELTA: u32 = 36;
+/// Gradient at the semantic feature (4).
+pub const STATE_FEATURE_DELTA: u32 = 37;
+/// Gradient at the colour decoder's hidden layer (8).
+pub const STATE_COLOR_HIDDEN_DELTA: u32 = 41;
+/// Gradient at the semantic decoder's hidden layer (8).
+pub const STATE_SEMANTIC_HIDDEN_DELTA: u32 = 49;
+/// Gradient at the composited appearance features (8).
+pub const STATE_APPEARANCE_GRADIENT: u32 = 57;
+/// Gradient at the composited semantic features (8).
+pub const STATE_SEMANTIC_GRADIENT: u32 = 65;
+/// Depth \[m\], opacity, gradient at the depth (1).
+pub const STATE_DEPTH: u32 = 73;
+/// Pose gradient: translation, rotation (2).
+pub const STATE_POSE: u32 = 74;
+/// Size in vec4.
+pub const STATE_END: u32 = 76;
+
+/// Constants every shader may name as `${NAME}`.
+pub const CONSTANTS: &[(&str, u32)] = &[
+    ("CHANNELS", CHANNELS as u32),
+    ("LEVELS", 2),
+    ("UNROLL", 1),
+    ("SURFACE_VEC4", (GEOMETRY_FLOATS / 4) as u32),
+    ("HEAD_VEC4", (HEAD_FLOATS / 4) as u32),
+    ("MAX_STRATIFIED", MAX_STRATIFIED),
+    ("RAY_STATE_VEC4", STATE_END),
+    ("STATE_APPEARANCE", STATE_APPEARANCE),
+    ("STATE_SEMANTIC", STATE_SEMANTIC),
+    ("STATE_COLOR_HIDDEN", STATE_COLOR_HIDDEN),
+    ("STATE_SEMANTIC_HIDDEN", STATE_SEMANTIC_HIDDEN),
+    ("STATE_FEATURE", STATE_FEATURE),
+    ("STATE_COLOR_DELTA", STATE_COLOR_DELTA),
+    ("STATE_FEATURE_DELTA", STATE_FEATURE_DELTA),
+    ("STATE_COLOR_HIDDEN_DELTA", STATE_COLOR_HIDDEN_DELTA),
+    ("STATE_SEMANTIC_HIDDEN_DELTA", STATE_SEMANTIC_HIDDEN_DELTA),
+    ("STATE_APPEARANCE_GRADIENT", STATE_APPEARANCE_GRADIENT),
+    ("STATE_SEMANTIC_GRADIENT", STATE_SEMANTIC_GRADIENT),
+    ("STATE_DEPTH", STATE_DEPTH),
+    ("STATE_POSE", STATE_POSE),
+];
+
+params! {
+    /// Parameters of all ray and field kernels (`shaders/shared/params.wgsl`).
+    pub struct FieldParams {
+        /// Image width \[pixels\].
+        width: u32,
+        /// Image height \[pixels\].
+        height: u32,
+        /// Rays (or points) of the batch.
+        rays: u32,
+        /// Samples a ray.
+        samples: u32,
+        /// Focal length \[pixels\].
+        fx: f32,
+        /// Focal length \[pixels\].
+        fy: f32,
+        /// Principal point \[pixels\].
+        cx: f32,
+        /// Principal point \[pixels\].
+        cy: f32,
+        /// Metres per unit of the depth image.
+        depth_unit: f32,
+        /// Truncation \[m\].
+        truncation: f32,
+        /// Sharpness of the interval weights \[1/truncation\].
+        sharpness: f32,
+        /// Depth of the first sample \[m\].
+        near: f32,
+        /// Seed of the run.
+        seed: u32,
+        /// Counter of batches.
+        iteration: u32,
+        /// `FLAG_*`.
+        flags: u32,
+        /// Rays of each window frame.
+        rays_per_frame: u32,
+        /// Stratified samples a ray.
+        stratified: u32,
+        /// Samples near the surface.
+        surface_samples: u32,
+        /// Classes, 0 without semantics.
+        classes: u32,
+        /// First pixel of a dense batch.
+        first: u32,
+        /// Smallest corner of the map \[m\].
+        box_min: [f32; 4],
+        /// Largest corner of the map \[m\].
+        box_max: [f32; 4],
+        /// nx, ny, nz, first cell.
+        geometry_coarse: [u32; 4],
+        /// nx, ny, nz, first cell.
+        geometry_fine: [u32; 4],
+        /// nx, ny, nz, first cell.
+        surface_coarse: [u32; 4],
+        /// nx, ny, nz, first cell.
+        surface_fine: [u32; 4],
+        /// 1 / cell, coarse and fine \[1/m\].
+        geometry_inv_cell: [f32; 4],
+        /// 1 / cell, coarse and fine \[1/m\].
+        surface_inv_cell: [f32; 4],
+        /// Weight of the free-space loss.
+        weight_free: f32,
+        /// Weight of the distance loss near the surface.
+        weight_centre: f32,
+        /// Weight of the distance loss in the rest of the truncation band.
+        weight_tail: f32,
+        /// Weight of the depth loss.
+        weight_depth: f32,
+        /// Weight of the colour loss.
+        weight_color: f32,
+        /// Weight of the cross-entropy.
+        weight_semantic: f32,
+        /// Intervals lighter than this carry no appearance or semantics.
+        min_weight: f32,
+        /// Only every n-th tile of samples trains the geometry decoder.
+        decoder_stride: u32,
+        /// Quanta per unit of gradient, geometry planes.
+        scale_geometry: f32,
+        /// Quanta per unit of gradient, appearance planes.
+        scale_appearance: f32,
+        /// Quanta per unit of gradient, semantic planes.
+        scale_semantic: f32,
+        /// Largest single contribution in quanta.
+        contribution_limit: f32,
+        /// align_points: 1 / sigma of the distance residual \[1/m\].
+        inv_sigma_distance: f32,
+        /// align_points: 1 / sigma of the intensity residual.
+        inv_sigma_intensity: f32,
+        /// align_points: scale of the robust weight on distances \[m\].
+        robust_distance: f32,
+        /// align_points: scale of the robust weight on intensities.
+        robust_intensity: f32,
+    }
+}

@@ -14,8 +14,20 @@ use alloc::{
 };
 
 /// Files that shaders may import.
-pub const SHARED: &[(&str, &str)] =
-    &[("shared/dispatch.wgsl", include_str!("../../shaders/shared/dispatch.wgsl"))];
+pub const SHARED: &[(&str, &str)] = &[
+    ("shared/appearance.wgsl", include_str!("../../shaders/shared/appearance.wgsl")),
+    ("shared/dispatch.wgsl", include_str!("../../shaders/shared/dispatch.wgsl")),
+    ("shared/geometry.wgsl", include_str!("../../shaders/shared/geometry.wgsl")),
+    ("shared/geometry_gradient.wgsl", include_str!("../../shaders/shared/geometry_gradient.wgsl")),
+    ("shared/geometry_mlp.wgsl", include_str!("../../shaders/shared/geometry_mlp.wgsl")),
+    ("shared/params.wgsl", include_str!("../../shaders/shared/params.wgsl")),
+    ("shared/planes.wgsl", include_str!("../../shaders/shared/planes.wgsl")),
+    ("shared/random.wgsl", include_str!("../../shaders/shared/random.wgsl")),
+    ("shared/rays.wgsl", include_str!("../../shaders/shared/rays.wgsl")),
+    ("shared/semantic.wgsl", include_str!("../../shaders/shared/semantic.wgsl")),
+    ("shared/surface.wgsl", include_str!("../../shaders/shared/surface.wgsl")),
+    ("shared/weights.wgsl", include_str!("../../shaders/shared/weights.wgsl")),
+];
 
 /// Limit on the total of unrolled iterations of one shader: more is a mistake, not a kernel.
 const MAX_ITERATIONS: i64 = 100_000;

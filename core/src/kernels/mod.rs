@@ -7,6 +7,7 @@
 mod dispatch;
 #[macro_use]
 mod params;
+pub mod shared;
 
 pub use dispatch::{
     CpuBinding, CpuDispatch, add_i32, load_f32, load_i32, load_u32, or_u32, store_f32, store_i32,
@@ -103,7 +104,42 @@ macro_rules! registry {
 }
 
 registry! {
+    /// Parameter updates.
     adam: ADAM,
+    /// Normal equations against the field.
+    align_points: ALIGN_POINTS,
+    /// Interval weights.
+    composite: COMPOSITE,
+    /// Gradients at the signed distances.
+    composite_backward: COMPOSITE_BACKWARD,
+    /// Colour, classes and losses.
+    decode_rays: DECODE_RAYS,
+    /// Gradients at features and positions.
+    geometry_backward: GEOMETRY_BACKWARD,
+    /// Signed distances.
+    geometry_forward: GEOMETRY_FORWARD,
+    /// Geometry decoder's gradient.
+    geometry_weights: GEOMETRY_WEIGHTS,
+    /// Outliers of tracking.
+    mask_rays: MASK_RAYS,
+    /// Rays' pose gradients.
+    pose_gradient: POSE_GRADIENT,
+    /// Pose updates.
+    pose_step: POSE_STEP,
+    /// Single points.
+    query_points: QUERY_POINTS,
+    /// Column sums.
+    reduce_partials: REDUCE_PARTIALS,
+    /// Sample placement.
+    sample_depths: SAMPLE_DEPTHS,
+    /// Pixels and rays.
+    sample_rays: SAMPLE_RAYS,
+    /// Gradients into the geometry planes.
+    scatter_geometry: SCATTER_GEOMETRY,
+    /// Gradients into the appearance and semantic planes.
+    scatter_surface: SCATTER_SURFACE,
+    /// Per-ray decoders' gradients.
+    weight_gradient: WEIGHT_GRADIENT,
 }
 
 /// All kernels, in the order of registration.

@@ -1,0 +1,754 @@
+//! The map's buffers on an engine, and the recordings of one pass over a batch of rays.
+use crate::{
+    camera::Camera,
+    config::{Config, LossConfig},
+    engine::{Engine, EngineError},
+    field::{FieldShape, decoder_floats, initial_decoders, initial_planes},
+    frame::Frame,
+    kernels::{
+        adam::{ADAM, AdamParams},
+        align_points::{ALIGN_POINTS, ALIGN_ROW},
+        composite::COMPOSITE,
+        composite_backward::COMPOSITE_BACKWARD,
+        decode_rays::DECODE_RAYS,
+        geometry_backward::GEOMETRY_BACKWARD,
+        geometry_forward::GEOMETRY_FORWARD,
+        geometry_weights::GEOMETRY_WEIGHTS,
+        pose_gradient::POSE_GRADIENT,
+        pose_step::{POSE_STATE_FLOATS, POSE_STEP, PoseStepParams},
+        query_points::QUERY_POINTS,
+        reduce_partials::{REDUCE_PARTIALS, ReducePartialsParams},
+        sample_depths::SAMPLE_DEPTHS,
+        sample_rays::SAMPLE_RAYS,
+        scatter_geometry::SCATTER_GEOMETRY,
+        scatter_surface::SCATTER_SURFACE,
+        shared::{FLAG_MAP, FLAG_POSE, RAY_WORDS},
+        weight_gradient::{WEIGHT_GRADIENT, WeightGradientParams},
+    },
+    layout::{
+        FieldParams, GEOMETRY_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_APPEARANCE,
+        STATE_COLOR_DELTA, STATE_COLOR_HIDDEN, STATE_COLOR_HIDDEN_DELTA, STATE_FEATURE,
+        STATE_FEATURE_DELTA, STATE_SEMANTIC, STATE_SEMANTIC_HIDDEN, STATE_SEMANTIC_HIDDEN_DELTA,
+    },
+    pose::Pose,
+    recording::{BufferId, Recording},
+};
+use alloc::{vec, vec::Vec};
+use glam::{DMat3, DVec3};
+
+/// Workgroups (rows of partial sums) of the geometry decoder's gradient.
+const GEOMETRY_ROWS: u32 = 64;
+/// Rays a row of partial sums of the per-ray decoders.
+const DECODER_CHUNK: u32 = 250;
+/// Points a query holds at most.
+pub const QUERY_POINTS_MAX: usize = 1 << 17;
+/// Most frames a window holds.
+pub const WINDOW_MAX: usize = 64;
+/// Fixed-point quanta per unit of gradient and ray. A surface hit by every ray of a batch stays
+/// 2^10 below saturation; a residual of 1e-4 still moves several quanta.
+const QUANTA: [f32; 3] = [262_144.0, 262_144.0, 1_048_576.0];
+
+/// A parameter tensor with what Adam keeps beside it.
+#[derive(Clone, Copy, Debug)]
+pub struct Trained {
+    /// Values.
+    pub values: BufferId,
+    /// Gradients: fixed-point i32 for planes, f32 for decoders.
+    pub gradient: BufferId,
+    /// First moments.
+    pub moment1: BufferId,
+    /// Second moments.
+    pub moment2: BufferId,
+    /// Number of floats.
+    pub floats: usize,
+}
+
+impl Trained {
+    fn new(engine: &mut Engine, name: &'static str, floats: usize) -> Result<Trained, EngineError> {
+        Ok(Trained {
+            values: engine.create_buffer(name, floats)?,
+            gradient: engine.create_buffer(name, floats)?,
+            moment1: engine.create_buffer(name, floats)?,
+            moment2: engine.create_buffer(name, floats)?,
+            floats,
+        })
+    }
+
+    fn destroy(&self, engine: &mut Engine) {
+        for b in [self.values, self.gradient, self.moment1, self.moment2] {
+            engine.destroy_buffer(b);
+        }
+    }
+}
+
+/// One batch of rays.
+#[derive(Clone, Copy, Debug)]
+pub struct Batch<'a> {
+    /// Window frames, each with the same number of rays.
+    pub frames: u32,
+    /// Rays of each frame.
+    pub rays_per_frame: u32,
+    /// Stratified samples a ray.
+    pub stratified: u32,
+    /// Second-round samples a ray.
+    pub surface: u32,
+    /// `FLAG_*`.
+    pub flags: u32,
+    /// Loss weights.
+    pub loss: &'a LossConfig,
+    /// Counter for the random numbers.
+    pub iteration: u32,
+    /// First pixel of a dense batch.
+    pub first: u32,
+}
+
+impl Batch<'_> {
+    fn rays(&self) -> u32 {
+        self.frames * self.rays_per_frame
+    }
+    fn samples(&self) -> u32 {
+        self.stratified + self.surface
+    }
+}
+
+/// Step sizes of one optimisation step.
+#[derive(Clone, Copy, Debug)]
+pub struct Rates {
+    /// Plane features.
+    pub planes: f64,
+    /// Decoders.
+    pub decoders: f64,
+}
+
+/// Poses as the device holds them: rotation row-major, translation.
+pub fn pose_words(pose: &Pose) -> [f32; 12] {
+    let m = pose.to_row_major();
+    [m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10], m[3], m[7], m[11]].map(|x| x as f32)
+}
+
+/// The inverse of [`pose_words`], orthonormalised; `None` when a number is not finite.
+pub fn pose_from_words(w: &[f32]) -> Option<Pose> {
+    let v = |i: usize| f64::from(w[i]);
+    let pose = Pose {
+        rotation: DMat3::from_cols(
+            DVec3::new(v(0), v(3), v(6)),
+            DVec3::new(v(1), v(4), v(7)),
+            DVec3::new(v(2), v(5), v(8)),
+        ),
+        translation: DVec3::new(v(9), v(10), v(11)),
+    };
+    pose.is_finite().then(|| pose.orthonormalised())
+}
+
+/// Buffers of the map, of the stored frames, and scratch space of a batch.
+pub struct Device {
+    /// The engine.
+    pub engine: Engine,
+    /// Bounds and grids.
+    pub shape: FieldShape,
+    /// Geometry planes.
+    pub geometry: Trained,
+    /// Appearance planes.
+    pub appearance: Trained,
+    /// Semantic planes (of minimal size without classes).
+    pub semantic: Trained,
+    /// All decoders.
+    pub decoders: Trained,
+    /// Number of classes.
+    pub classes: u32,
+    /// Steps Adam has taken.
+    pub step: u32,
+    /// Storage slots of frames; slot 0 is the current frame.
+    pub slots: u32,
+    camera: Camera,
+    depth_unit_m: f64,
+    base: FieldParams,
+    status: BufferId,
+    poses: BufferId,
+    window: BufferId,
+    pose_state: BufferId,
+    color_images: BufferId,
+    depth_images: BufferId,
+    rays: BufferId,
+    depths: BufferId,
+    distances: BufferId,
+    weights: BufferId,
+    distance_gradient: BufferId,
+    features: BufferId,
+    position_gradient: BufferId,
+    ray_state: BufferId,
+    ray_out: BufferId,
+    logits_gradient: BufferId,
+    geometry_partials: BufferId,
+    decoder_partials: BufferId,
+    points: BufferId,
+    values: BufferId,
+    max_rays: u32,
+}
+
+impl Device {
+    /// Makes every buffer and the map's first values. Fails, with the numbers, when a buffer
+    /// passes what the engine can bind.
+    pub fn new(
+        mut engine: Engine,
+        config: &Config,
+        camera: Camera,
+        depth_unit_m: f64,
+        classes: u32,
+        shape: FieldShape,
+    ) -> Result<Device, EngineError> {
+        let e = &mut engine;
+        let pixels = camera.pixels();
+        let slot_bytes = pixels * 4 + pixels.div_ceil(2) * 4;
+        let by_limit = e.max_buffer_words() / pixels;
+        let slots = (config.keyframes.budget_mib as usize * (1 << 20) / slot_bytes)
+            .min(by_limit)
+            .clamp(4, 1024) as u32;
+        let s = &config.sampling;
+        let max_rays = config.mapping.rays.max(config.tracking.render_rays) as usize;
+        let samples = (s.stratified + s.surface) as usize;
+        let render_samples = (s.render_stratified + s.render_surface) as usize;
+        let total = max_rays * samples.max(render_samples);
+        let trained_samples = max_rays * samples;
+        let semantic_floats = if classes > 0 { shape.surface_floats() } else { 16 };
+        let rows = max_rays.div_ceil(DECODER_CHUNK as usize);
+        let mut base: FieldParams = bytemuck::Zeroable::zeroed();
+        base.width = camera.width;
+        base.height = camera.height;
+        base.fx = camera.fx as f32;
+        base.fy = camera.fy as f32;
+        base.cx = camera.cx as f32;
+        base.cy = camera.cy as f32;
+        base.depth_unit = depth_unit_m as f32;
+        base.truncation = config.field.truncation_m as f32;
+        base.sharpness = config.field.sharpness as f32;
+        base.near = s.near_m as f32;
+        base.seed = config.seed;
+        base.classes = classes;
+        base.min_weight = s.min_weight as f32;
+        base.decoder_stride = config.mapping.decoder_stride;
+        base.contribution_limit = 4_194_304.0;
+        let t = &config.tracking;
+        base.inv_sigma_distance = (1.0 / t.align_sigma_distance_m) as f32;
+        base.inv_sigma_intensity = (1.0 / t.align_sigma_intensity) as f32;
+        base.robust_distance = (2.0 * t.align_sigma_distance_m) as f32;
+        base.robust_intensity = (2.0 * t.align_sigma_intensity) as f32;
+        shape.fill(&mut base);
+        let device = Device {
+            shape,
+            geometry: Trained::new(e, "geometry planes", shape.geometry_floats())?,
+            appearance: Trained::new(e, "appearance planes", shape.surface_floats())?,
+            semantic: Trained::new(e, "semantic planes", semantic_floats)?,
+            decoders: Trained::new(e, "decoders", decoder_floats(classes))?,
+            classes,
+            step: 0,
+            slots,
+            camera,
+            depth_unit_m,
+            base,
+            status: e.create_buffer("status", 4)?,
+            poses: e.create_buffer("poses", slots as usize * 12)?,
+            window: e.create_buffer("window", WINDOW_MAX)?,
+            pose_state: e.create_buffer("pose state", slots as usize * POSE_STATE_FLOATS)?,
+            color_images: e.create_buffer("colour images", slots as usize * pixels)?,
+            depth_images: e.create_buffer("depth images", slots as usize * pixels.div_ceil(2))?,
+            rays: e.create_buffer("rays", max_rays * RAY_WORDS)?,
+            depths: e.create_buffer("sample depths", total)?,
+            distances: e.create_buffer("distances", total)?,
+            weights: e.create_buffer("weights", total)?,
+            distance_gradient: e.create_buffer("distance gradients", total)?,
+            features: e.create_buffer("features", trained_samples * 32)?,
+            position_gradient: e.create_buffer("position gradients", trained_samples * 4)?,
+            ray_state: e.create_buffer("ray state", max_rays * RAY_STATE_FLOATS)?,
+            ray_out: e.create_buffer("ray outputs", max_rays * RAY_OUT_FLOATS)?,
+            logits_gradient: e.create_buffer("logits", (max_rays * classes as usize).max(4))?,
+            geometry_partials: e
+                .create_buffer("geometry partials", GEOMETRY_ROWS as usize * GEOMETRY_FLOATS)?,
+            decoder_partials: e.create_buffer(
+                "decoder partials",
+                rows * (decoder_floats(classes) - GEOMETRY_FLOATS),
+            )?,
+            points: e.create_buffer("points", QUERY_POINTS_MAX * 4)?,
+            values: e.create_buffer("values", QUERY_POINTS_MAX * 8)?,
+            max_rays: max_rays as u32,
+            engine,
+        };
+        let mut device = device;
+        let mut r = Recording::default();
+        let seed = config.seed;
+        r.upload(device.geometry.values, 0, &initial_planes(device.geometry.floats, seed, 0));
+        r.upload(device.appearance.values, 0, &initial_planes(device.appearance.floats, seed, 1));
+        r.upload(device.semantic.values, 0, &initial_planes(device.semantic.floats, seed, 2));
+        r.upload(device.decoders.values, 0, &initial_decoders(classes, seed));
+        device.engine.submit(&r)?;
+        Ok(device)
+    }
+
+    /// Largest batch a dense pass may have.
+    pub fn max_rays(&self) -> u32 {
+        self.max_rays
+    }
+
+    /// Puts a frame's images into a slot.
+    pub fn upload_frame(&self, r: &mut Recording, slot: u32, frame: &Frame) {
+        let pixels = self.camera.pixels();
+        let mut color = Vec::with_capacity(pixels);
+        for (i, c) in frame.color.iter().enumerate() {
+            let label = frame.labels.as_ref().map_or(255, |l| l[i]);
+            color.push(u32::from_le_bytes([c[0], c[1], c[2], label]));
+        }
+        let depth: Vec<u32> = frame
+            .depth
+            .chunks(2)
+            .map(|d| u32::from(d[0]) | d.get(1).map_or(0, |x| u32::from(*x) << 16))
+            .collect();
+        r.upload(self.color_images, slot as usize * pixels, &color);
+        r.upload(self.depth_images, slot as usize * pixels.div_ceil(2), &depth);
+    }
+
+    /// Copies images and pose of one slot to another.
+    pub fn copy_slot(&self, r: &mut Recording, from: u32, to: u32) {
+        let pixels = self.camera.pixels();
+        for (buffer, words) in
+            [(self.color_images, pixels), (self.depth_images, pixels.div_ceil(2)), (self.poses, 12)]
+        {
+            r.copy(buffer, from as usize * words, buffer, to as usize * words, words);
+        }
+        r.clear(self.pose_state, to as usize * POSE_STATE_FLOATS, POSE_STATE_FLOATS);
+    }
+
+    /// Sets the pose of a slot.
+    pub fn upload_pose(&self, r: &mut Recording, slot: u32, pose: &Pose) {
+        r.upload(self.poses, slot as usize * 12, &pose_words(pose));
+    }
+
+    /// Sets the window: slots, and whether each pose is fixed.
+    pub fn upload_window(&self, r: &mut Recording, window: &[(u32, bool)]) {
+        let words: Vec<u32> =
+            window.iter().map(|(slot, fixed)| slot | (u32::from(*fixed) << 31)).collect();
+        r.upload(self.window, 0, &words);
+    }
+
+    /// Poses of all slots up to `count`.
+    pub async fn read_poses(&mut self, count: u32) -> Result<Vec<Option<Pose>>, EngineError> {
+        let words: Vec<f32> = self.engine.read_as(self.poses, 0, count as usize * 12).await?;
+        Ok(words.chunks_exact(12).map(pose_from_words).collect())
+    }
+
+    fn params(&self, b: &Batch<'_>) -> FieldParams {
+        let mut p = self.base;
+        p.rays = b.rays();
+        p.rays_per_frame = b.rays_per_frame;
+        p.samples = b.samples();
+        p.stratified = b.stratified;
+        p.surface_samples = b.surface;
+        p.flags = b.flags;
+        p.iteration = b.iteration;
+        p.first = b.first;
+        p.weight_free = b.loss.free_space as f32;
+        p.weight_centre = b.loss.centre as f32;
+        p.weight_tail = b.loss.tail as f32;
+        p.weight_depth = b.loss.depth as f32;
+        p.weight_color = b.loss.color as f32;
+        p.weight_semantic = b.loss.semantic as f32;
+        [p.scale_geometry, p.scale_appearance, p.scale_semantic] =
+            QUANTA.map(|q| q * b.rays() as f32);
+        p
+    }
+
+    /// Rays, samples, signed distances, compositing, decoding and their losses.
+    pub fn record_forward(&self, r: &mut Recording, b: &Batch<'_>) {
+        let p = self.params(b);
+        let (rays, samples) = (p.rays as usize, (p.rays * p.samples) as usize);
+        let (geometry, decoders) = (self.geometry.values, self.decoders.values);
+        r.dispatch_1d(
+            &SAMPLE_RAYS,
+            &p,
+            &[self.poses, self.window, self.color_images, self.depth_images, self.rays],
+            rays,
+        );
+        r.dispatch_1d(&SAMPLE_DEPTHS, &p, &[self.rays, geometry, decoders, self.depths], rays);
+        r.dispatch_1d(
+            &GEOMETRY_FORWARD,
+            &p,
+            &[self.rays, self.depths, geometry, decoders, self.features, self.distances],
+            samples,
+        );
+        r.dispatch_1d(
+            &COMPOSITE,
+            &p,
+            &[
+                self.rays,
+                self.depths,
+                self.distances,
+                self.appearance.values,
+                self.semantic.values,
+                self.weights,
+                self.ray_state,
+            ],
+            rays,
+        );
+        r.dispatch_1d(
+            &DECODE_RAYS,
+            &p,
+            &[self.rays, decoders, self.ray_state, self.ray_out, self.logits_gradient],
+            rays,
+        );
+    }
+
+    /// Gradients down to the signed distances and, as the flags say, features and positions.
+    pub fn record_backward(&self, r: &mut Recording, b: &Batch<'_>) {
+        let p = self.params(b);
+        let (rays, samples) = (p.rays as usize, (p.rays * p.samples) as usize);
+        let (geometry, decoders) = (self.geometry.values, self.decoders.values);
+        r.dispatch_1d(
+            &COMPOSITE_BACKWARD,
+            &p,
+            &[
+                self.rays,
+                self.depths,
+                self.distances,
+                self.weights,
+                self.appearance.values,
+                self.ray_state,
+                self.ray_out,
+                self.distance_gradient,
+            ],
+            rays,
+        );
+        if b.flags & FLAG_MAP != 0 {
+            r.dispatch(
+                &GEOMETRY_WEIGHTS,
+                &p,
+                &[self.features, self.distance_gradient, decoders, self.geometry_partials],
+                [GEOMETRY_ROWS, 1, 1],
+            );
+        }
+        r.dispatch_1d(
+            &GEOMETRY_BACKWARD,
+            &p,
+            &[
+                self.rays,
+                self.depths,
+                geometry,
+                decoders,
+                self.distance_gradient,
+                self.features,
+                self.position_gradient,
+            ],
+            samples,
+        );
+        if b.flags & FLAG_POSE != 0 {
+            r.dispatch_1d(
+                &POSE_GRADIENT,
+                &p,
+                &[self.rays, self.depths, self.position_gradient, self.ray_state],
+                rays,
+            );
+        }
+        if b.flags & FLAG_MAP != 0 {
+            r.dispatch_1d(
+                &SCATTER_GEOMETRY,
+                &p,
+                &[
+                    self.rays,
+                    self.depths,
+                    self.distance_gradient,
+                    self.features,
+                    self.geometry.gradient,
+                    self.status,
+                ],
+                rays * 24,
+            );
+            r.dispatch_1d(
+                &SCATTER_SURFACE,
+                &p,
+                &[
+                    self.rays,
+                    self.depths,
+                    self.weights,
+                    self.ray_state,
+                    self.appearance.gradient,
+                    self.semantic.gradient,
+                    self.status,
+                ],
+                rays * if self.classes > 0 { 12 } else { 6 },
+            );
+        }
+    }
+
+    /// One Adam step of the window's poses from the last backward pass.
+    pub fn record_pose_step(
+        &self,
+        r: &mut Recording,
+        b: &Batch<'_>,
+        rate_translation_m: f64,
+        rate_rotation_rad: f64,
+        restart: bool,
+    ) {
+        let p = PoseStepParams {
+            rays_per_frame: b.rays_per_frame,
+            restart: u32::from(restart),
+            learning_rate_translation: rate_translation_m as f32,
+            learning_rate_rotation: rate_rotation_rad as f32,
+            weight_color: b.loss.color as f32,
+            weight_depth: b.loss.depth as f32,
+        };
+        r.dispatch(
+            &POSE_STEP,
+            &p,
+            &[self.ray_state, self.ray_out, self.window, self.poses, self.pose_state],
+            [b.frames, 1, 1],
+        );
+    }
+
+    /// Decoder gradients from the last backward pass, then Adam on everything.
+    pub fn record_step(&mut self, r: &mut Recording, b: &Batch<'_>, rates: Rates) {
+        let p = self.params(b);
+        let floats = self.decoders.floats;
+        let row = (floats - GEOMETRY_FLOATS) as u32;
+        r.dispatch_1d(
+            &REDUCE_PARTIALS,
+            &ReducePartialsParams {
+                rows: GEOMETRY_ROWS,
+                columns: GEOMETRY_FLOATS as u32,
+                row: GEOMETRY_FLOATS as u32,
+                offset: 0,
+            },
+            &[self.geometry_partials, self.decoders.gradient],
+            GEOMETRY_FLOATS,
+        );
+        let chunks = p.rays.div_ceil(DECODER_CHUNK);
+        // (inputs, outputs, activations, deltas, weights, bias)
+        let mut layers = vec![
+            (32, 32, STATE_APPEARANCE, STATE_COLOR_HIDDEN_DELTA, 0, 1024),
+            (32, 4, STATE_COLOR_HIDDEN, STATE_COLOR_DELTA, 1056, 1184),
+        ];
+        if self.classes > 0 {
+            layers.push((32, 32, STATE_SEMANTIC, STATE_SEMANTIC_HIDDEN_DELTA, 1188, 2212));
+            layers.push((32, 16, STATE_SEMANTIC_HIDDEN, STATE_FEATURE_DELTA, 2244, 2756));
+            layers.push((16, self.classes, STATE_FEATURE, 0, 2772, 2772 + self.classes * 16));
+        }
+        for (i, (inputs, outputs, x, d, weight_offset, bias_offset)) in
+            layers.into_iter().enumerate()
+        {
+            let head = i == 4;
+            r.dispatch_1d(
+                &WEIGHT_GRADIENT,
+                &WeightGradientParams {
+                    rays: p.rays,
+                    inputs,
+                    outputs,
+                    chunk: DECODER_CHUNK,
+                    input_offset: x * 4,
+                    delta_offset: d * 4,
+                    from_logits: u32::from(head),
+                    row,
+                    weight_offset,
+                    bias_offset,
+                    input_stride: if head { 1 } else { outputs },
+                    output_stride: if head { 16 } else { 1 },
+                },
+                &[self.ray_state, self.logits_gradient, self.decoder_partials],
+                (chunks * (inputs + 1) * outputs) as usize,
+            );
+        }
+        r.dispatch_1d(
+            &REDUCE_PARTIALS,
+            &ReducePartialsParams {
+                rows: chunks,
+                columns: row,
+                row,
+                offset: GEOMETRY_FLOATS as u32,
+            },
+            &[self.decoder_partials, self.decoders.gradient],
+            row as usize,
+        );
+        self.step += 1;
+        let correction = |beta: f64| {
+            (1.0 / (1.0 - num_traits::Float::powi(beta, self.step.min(1 << 20) as i32))) as f32
+        };
+        let (correction1, correction2) = (correction(0.9), correction(0.999));
+        let mut adam = |t: &Trained, scale: Option<f32>, rate: f64| {
+            r.dispatch_1d(
+                &ADAM,
+                &AdamParams {
+                    offset: 0,
+                    count: t.floats as u32,
+                    fixed_point: u32::from(scale.is_some()),
+                    gradient_limit: 1 << 30,
+                    gradient_scale: scale.map_or(1.0, |s| 1.0 / s),
+                    learning_rate: rate as f32,
+                    beta1: 0.9,
+                    beta2: 0.999,
+                    epsilon: 1e-15,
+                    correction1,
+                    correction2,
+                },
+                &[t.values, t.gradient, t.moment1, t.moment2, self.status],
+                t.floats,
+            );
+        };
+        adam(&self.geometry, Some(p.scale_geometry), rates.planes);
+        adam(&self.appearance, Some(p.scale_appearance), rates.planes);
+        if self.classes > 0 {
+            adam(&self.semantic, Some(p.scale_semantic), rates.planes);
+        }
+        adam(&self.decoders, None, rates.decoders);
+    }
+
+    /// The rays' outputs of the last forward pass: [`RAY_OUT_FLOATS`] a ray.
+    pub async fn read_ray_out(&mut self, rays: u32) -> Result<Vec<f32>, EngineError> {
+        self.engine.read_as(self.ray_out, 0, rays as usize * RAY_OUT_FLOATS).await
+    }
+
+    /// Pose state of a slot after [`Device::record_pose_step`].
+    pub async fn read_pose_state(&mut self, slot: u32) -> Result<Vec<f32>, EngineError> {
+        let at = slot as usize * POSE_STATE_FLOATS;
+        self.engine.read_as(self.pose_state, at, POSE_STATE_FLOATS).await
+    }
+
+    /// What Adam and scatter reported since the start: bit 0 saturated, bit 1 not finite.
+    pub async fn read_status(&mut self) -> Result<u32, EngineError> {
+        Ok(self.engine.read(self.status, 0, 1).await?[0])
+    }
+
+    /// Uploads camera-frame points (x, y, z \[m\], intensity) for [`Device::align`].
+    pub fn upload_pixels(&self, r: &mut Recording, pixels: &[[f32; 4]]) {
+        r.upload(self.points, 0, pixels);
+    }
+
+    /// Sums of the normal equations over the uploaded pixels at a pose; see `align_points`.
+    pub async fn align(
+        &mut self,
+        pose: &Pose,
+        count: u32,
+    ) -> Result<[f64; ALIGN_ROW], EngineError> {
+        let mut r = Recording::default();
+        self.upload_pose(&mut r, 0, pose);
+        let mut p = self.base;
+        p.rays = count;
+        r.dispatch_1d(
+            &ALIGN_POINTS,
+            &p,
+            &[
+                self.poses,
+                self.points,
+                self.geometry.values,
+                self.appearance.values,
+                self.decoders.values,
+                self.values,
+            ],
+            count as usize,
+        );
+        self.engine.submit(&r)?;
+        let groups = count.div_ceil(64) as usize;
+        let rows: Vec<f32> = self.engine.read_as(self.values, 0, groups * ALIGN_ROW).await?;
+        let mut sums = [0.0; ALIGN_ROW];
+        for row in rows.chunks_exact(ALIGN_ROW) {
+            for (s, v) in sums.iter_mut().zip(row) {
+                *s += f64::from(*v);
+            }
+        }
+        Ok(sums)
+    }
+
+    /// Signed distances \[truncations\] at points, at most [`QUERY_POINTS_MAX`].
+    pub async fn query_distances(&mut self, points: &[[f32; 4]]) -> Result<Vec<f32>, EngineError> {
+        self.query(points, 0, 1).await
+    }
+
+    /// 8 floats a point: distance, class (bits), 0, 0, red, green, blue, 0.
+    pub async fn query_surface(&mut self, points: &[[f32; 4]]) -> Result<Vec<f32>, EngineError> {
+        self.query(points, FLAG_MAP, 8).await
+    }
+
+    async fn query(
+        &mut self,
+        points: &[[f32; 4]],
+        flags: u32,
+        floats: usize,
+    ) -> Result<Vec<f32>, EngineError> {
+        let mut out = Vec::with_capacity(points.len() * floats);
+        for chunk in points.chunks(QUERY_POINTS_MAX) {
+            let mut r = Recording::default();
+            r.upload(self.points, 0, chunk);
+            let mut p = self.base;
+            p.rays = chunk.len() as u32;
+            p.flags = flags;
+            r.dispatch_1d(
+                &QUERY_POINTS,
+                &p,
+                &[
+                    self.points,
+                    self.geometry.values,
+                    self.appearance.values,
+                    self.semantic.values,
+                    self.decoders.values,
+                    self.values,
+                ],
+                chunk.len(),
+            );
+            self.engine.submit(&r)?;
+            out.extend(self.engine.read_as::<f32>(self.values, 0, chunk.len() * floats).await?);
+        }
+        Ok(out)
+    }
+
+    /// Replaces the planes by larger ones; every old cell keeps its value and moments.
+    pub async fn grow(&mut self, shape: FieldShape, seed: u32) -> Result<(), EngineError> {
+        let old = self.shape;
+        let grids = [
+            (self.geometry, false, shape.geometry_floats(), 0),
+            (self.appearance, true, shape.surface_floats(), 1),
+            (self.semantic, true, if self.classes > 0 { shape.surface_floats() } else { 0 }, 2),
+        ];
+        let mut new = [self.geometry, self.appearance, self.semantic];
+        for (i, (t, surface, floats, salt)) in grids.into_iter().enumerate() {
+            if floats == 0 {
+                continue;
+            }
+            let names = ["geometry planes", "appearance planes", "semantic planes"];
+            let larger = Trained::new(&mut self.engine, names[i], floats)?;
+            for (from, to, first) in [
+                (t.values, larger.values, initial_planes(floats, seed, salt)),
+                (t.moment1, larger.moment1, vec![0.0; floats]),
+                (t.moment2, larger.moment2, vec![0.0; floats]),
+            ] {
+                let values: Vec<f32> = self.engine.read_as(from, 0, t.floats).await?;
+                let mut fresh = first;
+                shape.carry_over(&old, surface, &values, &mut fresh);
+                let mut r = Recording::default();
+                r.upload(to, 0, &fresh);
+                self.engine.submit(&r)?;
+            }
+            t.destroy(&mut self.engine);
+            new[i] = larger;
+        }
+        [self.geometry, self.appearance, self.semantic] = new;
+        self.shape = shape;
+        shape.fill(&mut self.base);
+        Ok(())
+    }
+
+    /// The camera of the stored frames.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// Metres per unit of the stored depth images.
+    pub fn depth_unit_m(&self) -> f64 {
+        self.depth_unit_m
+    }
+
+    /// Renders through another camera from now on (dense batches only use its size and intrinsics;
+    /// stored frames keep theirs, so reset it before mapping).
+    pub fn set_camera(&mut self, camera: &Camera) {
+        self.base.width = camera.width;
+        self.base.height = camera.height;
+        self.base.fx = camera.fx as f32;
+        self.base.fy = camera.fy as f32;
+        self.base.cx = camera.cx as f32;
+        self.base.cy = camera.cy as f32;
+    }
+}

@@ -1,0 +1,77 @@
+//! Interval weights, composited depth, opacity and features.
+use super::shared::{Grid, Ray, interval_alpha, phi};
+use super::{CpuDispatch, store_f32};
+use crate::{
+    layout::{FieldParams, RAY_STATE_FLOATS, STATE_APPEARANCE, STATE_DEPTH, STATE_SEMANTIC},
+};
+
+kernel! {
+    /// Weights of a ray's intervals (NeuS), composited depth, opacity and features.
+    pub static COMPOSITE = "composite" {
+        workgroup_size: 64,
+        params: FieldParams,
+        twin: twin,
+        bindings: [
+            rays: Read,
+            depths: Read,
+            distances: Read,
+            planes_appearance: Read,
+            planes_semantic: Read,
+            weights: ReadWrite,
+            ray_state: ReadWrite,
+        ],
+    }
+}
+
+fn twin(dispatch: &CpuDispatch<'_>) {
+    let p: FieldParams = dispatch.params();
+    let (rays, depths, distances) =
+        (dispatch.read_f32(0), dispatch.read_f32(1), dispatch.read_f32(2));
+    let (appearance_planes, semantic_planes) = (dispatch.read_f32(3), dispatch.read_f32(4));
+    let (weights, ray_state) = (dispatch.write(5), dispatch.write(6));
+    let grid = Grid::surface(&p);
+    let n = p.samples as usize;
+    dispatch.for_each_invocation(|id| {
+        if id >= p.rays as usize {
+            return;
+        }
+        let ray = Ray::load(rays, id);
+        let base = id * n;
+        let (mut appearance, mut semantic) = ([0.0_f32; 32], [0.0_f32; 32]);
+        let (mut transmittance, mut depth, mut opacity) = (1.0, 0.0, 0.0);
+        let mut phi0 = phi(p.sharpness, distances[base]);
+        for i in 1..n {
+            let phi1 = phi(p.sharpness, distances[base + i]);
+            let alpha = interval_alpha(phi0, phi1);
+            let w = transmittance * alpha;
+            transmittance *= 1.0 - alpha;
+            let z = 0.5 * (depths[base + i - 1] + depths[base + i]);
+            store_f32(&weights[base + i - 1], w);
+            depth += w * z;
+            opacity += w;
+            if w > p.min_weight {
+                let at = ray.at(z);
+                let f = grid.lookup(appearance_planes, at);
+                for k in 0..32 {
+                    appearance[k] += w * f[k];
+                }
+                if p.classes > 0 {
+                    let f = grid.lookup(semantic_planes, at);
+                    for k in 0..32 {
+                        semantic[k] += w * f[k];
+                    }
+                }
+            }
+            phi0 = phi1;
+        }
+        store_f32(&weights[base + n - 1], 0.0);
+        let state = &ray_state[id * RAY_STATE_FLOATS..(id + 1) * RAY_STATE_FLOATS];
+        for k in 0..32 {
+            store_f32(&state[STATE_APPEARANCE as usize * 4 + k], appearance[k]);
+            store_f32(&state[STATE_SEMANTIC as usize * 4 + k], semantic[k]);
+        }
+        for (k, v) in [depth, opacity, 0.0, 0.0].into_iter().enumerate() {
+            store_f32(&state[STATE_DEPTH as usize * 4 + k], v);
+        }
+    });
+}

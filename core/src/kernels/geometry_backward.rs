@@ -1,0 +1,63 @@
+//! From gradients at the signed distances to gradients at features and positions.
+use super::shared::{
+    FLAG_MAP, FLAG_POSE, Grid, Ray, geometry_decoder, geometry_deltas, geometry_feature_gradient,
+};
+use super::{CpuDispatch, load_f32, store_f32};
+use crate::{layout::FieldParams};
+
+kernel! {
+    /// Gradients at the plane features (over the features) and at the sample positions.
+    pub static GEOMETRY_BACKWARD = "geometry_backward" {
+        workgroup_size: 64,
+        params: FieldParams,
+        twin: twin,
+        bindings: [
+            rays: Read,
+            depths: Read,
+            planes_geometry: Read,
+            decoders: Read,
+            distance_gradient: Read,
+            features: ReadWrite,
+            position_gradient: ReadWrite,
+        ],
+    }
+}
+
+fn twin(dispatch: &CpuDispatch<'_>) {
+    let p: FieldParams = dispatch.params();
+    let (rays, depths) = (dispatch.read_f32(0), dispatch.read_f32(1));
+    let (planes, decoders, gradient) =
+        (dispatch.read_f32(2), dispatch.read_f32(3), dispatch.read_f32(4));
+    let (features, positions) = (dispatch.write(5), dispatch.write(6));
+    let grid = Grid::geometry(&p);
+    dispatch.for_each_invocation(|sample| {
+        if sample >= (p.rays * p.samples) as usize {
+            return;
+        }
+        let mut f = [0.0; 32];
+        let mut dp = [0.0; 3];
+        if gradient[sample] != 0.0 {
+            for k in 0..32 {
+                f[k] = load_f32(&features[sample * 32 + k]);
+            }
+            let s = geometry_decoder(decoders, &f);
+            let d = geometry_deltas(decoders, &s, gradient[sample]);
+            f = geometry_feature_gradient(decoders, &d);
+            if p.flags & FLAG_POSE != 0 {
+                let ray = Ray::load(rays, sample / p.samples as usize);
+                dp = grid.lookup_gradient(planes, ray.at(depths[sample]), &f);
+            }
+        }
+        if p.flags & FLAG_MAP != 0 {
+            for k in 0..32 {
+                store_f32(&features[sample * 32 + k], f[k]);
+            }
+        }
+        if p.flags & FLAG_POSE != 0 {
+            for k in 0..3 {
+                store_f32(&positions[sample * 4 + k], dp[k]);
+            }
+            store_f32(&positions[sample * 4 + 3], 0.0);
+        }
+    });
+}

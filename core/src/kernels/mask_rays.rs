@@ -1,0 +1,38 @@
+//! Takes outliers out of the tracking losses.
+use super::{CpuDispatch, load_f32, store_f32};
+use crate::{
+    layout::{FieldParams, RAY_OUT_FLOATS},
+};
+
+kernel! {
+    /// Masks rays without depth and those whose depth error exceeds ten times the median.
+    pub static MASK_RAYS = "mask_rays" {
+        workgroup_size: 64,
+        params: FieldParams,
+        twin: twin,
+        bindings: [ray_out: ReadWrite],
+    }
+}
+
+fn twin(dispatch: &CpuDispatch<'_>) {
+    let p: FieldParams = dispatch.params();
+    let ray_out = dispatch.write(0);
+    let error = |ray: usize| load_f32(&ray_out[ray * RAY_OUT_FLOATS + 10]);
+    let mut bins = [0_u32; 512];
+    for ray in 0..p.rays as usize {
+        if error(ray) > 0.0 {
+            bins[((error(ray).to_bits() >> 19) as i32 - 1776).clamp(0, 511) as usize] += 1;
+        }
+    }
+    let total: u32 = bins.iter().sum();
+    let (mut seen, mut i) = (0, 0);
+    while i < 511 && (seen + bins[i]) * 2 < total {
+        seen += bins[i];
+        i += 1;
+    }
+    let threshold = 10.0 * f32::from_bits((i as u32 + 1777) << 19);
+    for ray in 0..p.rays as usize {
+        let masked = error(ray) <= 0.0 || error(ray) > threshold;
+        store_f32(&ray_out[ray * RAY_OUT_FLOATS + 11], if masked { 1.0 } else { 0.0 });
+    }
+}

@@ -1,0 +1,121 @@
+//! One Adam step on the pose of each window frame.
+use super::shared::cross;
+use super::{CpuDispatch, load_f32, store_f32};
+use crate::{
+    layout::{RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_POSE},
+};
+#[cfg(not(feature = "std"))]
+use num_traits::Float as _;
+
+/// Floats a slot takes in `pose_state`: moments (6 + 6), best loss, best pose (12), loss of this
+/// step, gradient (6), steps taken, 3 unused.
+pub const POSE_STATE_FLOATS: usize = 36;
+/// Index of the best loss in a frame's state.
+pub const POSE_BEST_LOSS: usize = 12;
+
+params! {
+    /// Parameters of [`POSE_STEP`].
+    pub struct PoseStepParams {
+        /// Rays of each frame.
+        rays_per_frame: u32,
+        /// 1: forget moments and best pose first.
+        restart: u32,
+        /// Step size \[m\].
+        learning_rate_translation: f32,
+        /// Step size \[rad\].
+        learning_rate_rotation: f32,
+        /// Weight of the colour loss.
+        weight_color: f32,
+        /// Weight of the depth loss.
+        weight_depth: f32,
+    }
+}
+
+kernel! {
+    /// Sums the rays' pose gradients, one Adam step, left retraction; keeps the best pose.
+    pub static POSE_STEP = "pose_step" {
+        workgroup_size: 64,
+        params: PoseStepParams,
+        twin: twin,
+        bindings: [
+            ray_state: Read,
+            ray_out: Read,
+            window: Read,
+            poses: ReadWrite,
+            pose_state: ReadWrite,
+        ],
+    }
+}
+
+fn twin(dispatch: &CpuDispatch<'_>) {
+    let p: PoseStepParams = dispatch.params();
+    let (ray_state, ray_out) = (dispatch.read_f32(0), dispatch.read_f32(1));
+    let window = dispatch.read_u32(2);
+    let (poses, pose_state) = (dispatch.write(3), dispatch.write(4));
+    dispatch.for_each_workgroup(|frame| {
+        let mut step = [0.0_f32; 6];
+        let mut loss = 0.0;
+        for ray in frame * p.rays_per_frame..(frame + 1) * p.rays_per_frame {
+            let s = &ray_state[ray as usize * RAY_STATE_FLOATS + STATE_POSE as usize * 4..][..8];
+            let out = &ray_out[ray as usize * RAY_OUT_FLOATS..][..RAY_OUT_FLOATS];
+            for k in 0..3 {
+                step[k] += s[k];
+                step[3 + k] += s[4 + k];
+            }
+            if out[11] < 0.5 {
+                loss += p.weight_color * out[6] + p.weight_depth * out[7] + out[9];
+            }
+        }
+        let slot = (window[frame as usize] & 0x7fff_ffff) as usize;
+        let s = &pose_state[slot * POSE_STATE_FLOATS..][..POSE_STATE_FLOATS];
+        let pose = &poses[slot * 12..][..12];
+        if p.restart == 1 {
+            s[..12].iter().for_each(|x| store_f32(x, 0.0));
+            store_f32(&s[POSE_BEST_LOSS], 3e38);
+            store_f32(&s[32], 0.0);
+        }
+        let steps = load_f32(&s[32]) + 1.0;
+        store_f32(&s[32], steps);
+        // 1 - 0.9^t and 1 - 0.999^t by their logarithms.
+        let correction1 = 1.0 / (1.0 - (steps * -0.105_360_516).exp());
+        let correction2 = 1.0 / (1.0 - (steps * -0.001_000_500_3).exp());
+        if loss < load_f32(&s[POSE_BEST_LOSS]) {
+            store_f32(&s[POSE_BEST_LOSS], loss);
+            for k in 0..12 {
+                store_f32(&s[13 + k], load_f32(&pose[k]));
+            }
+        }
+        store_f32(&s[25], loss);
+        for k in 0..6 {
+            let g = step[k];
+            store_f32(&s[26 + k], g);
+            let m1 = 0.9 * load_f32(&s[k]) + 0.1 * g;
+            let m2 = 0.999 * load_f32(&s[6 + k]) + 0.001 * g * g;
+            store_f32(&s[k], m1);
+            store_f32(&s[6 + k], m2);
+            let rate = if k < 3 { p.learning_rate_translation } else { p.learning_rate_rotation };
+            step[k] = -rate * m1 * correction1 / ((m2 * correction2).sqrt() + 1e-15);
+        }
+        if window[frame as usize] & 0x8000_0000 != 0 {
+            return;
+        }
+        let omega = [step[3], step[4], step[5]];
+        let angle = omega.iter().map(|x| x * x).sum::<f32>().sqrt();
+        let (mut a, mut b) = (1.0, 0.5);
+        if angle > 1e-6 {
+            a = angle.sin() / angle;
+            b = (1.0 - angle.cos()) / (angle * angle);
+        }
+        for c in 0..3 {
+            let r = [load_f32(&pose[c]), load_f32(&pose[3 + c]), load_f32(&pose[6 + c])];
+            let x = cross(omega, r);
+            let y = cross(omega, x);
+            for k in 0..3 {
+                store_f32(&pose[3 * k + c], r[k] + a * x[k] + b * y[k]);
+            }
+        }
+        for k in 0..3 {
+            store_f32(&pose[9 + k], load_f32(&pose[9 + k]) + step[k]);
+        }
+    });
+}

@@ -1,0 +1,66 @@
+//! The field at single points.
+use super::shared::{
+    FLAG_MAP, Grid, class_logit, color_hidden, color_output, geometry_decoder, semantic_hidden,
+    semantic_output, surface_weights,
+};
+use super::{CpuDispatch, store_f32, store_u32};
+use crate::{layout::FieldParams};
+
+kernel! {
+    /// Signed distance \[truncations\] at points; with `FLAG_MAP` colour and class too.
+    pub static QUERY_POINTS = "query_points" {
+        workgroup_size: 64,
+        params: FieldParams,
+        twin: twin,
+        bindings: [
+            points: Read,
+            planes_geometry: Read,
+            planes_appearance: Read,
+            planes_semantic: Read,
+            decoders: Read,
+            values: ReadWrite,
+        ],
+    }
+}
+
+fn twin(dispatch: &CpuDispatch<'_>) {
+    let p: FieldParams = dispatch.params();
+    let points = dispatch.read_f32(0);
+    let (geometry, appearance, semantic) =
+        (dispatch.read_f32(1), dispatch.read_f32(2), dispatch.read_f32(3));
+    let decoders = dispatch.read_f32(4);
+    let values = dispatch.write(5);
+    let (grid, surface_grid) = (Grid::geometry(&p), Grid::surface(&p));
+    let surface = surface_weights(decoders);
+    dispatch.for_each_invocation(|i| {
+        if i >= p.rays as usize {
+            return;
+        }
+        let at = [points[i * 4], points[i * 4 + 1], points[i * 4 + 2]];
+        let distance = geometry_decoder(decoders, &grid.lookup(geometry, at)).distance;
+        if p.flags & FLAG_MAP == 0 {
+            store_f32(&values[i], distance);
+            return;
+        }
+        let f = surface_grid.lookup(appearance, at);
+        let rgb = color_output(surface, &color_hidden(surface, &f));
+        let mut best_class = 255;
+        if p.classes > 0 {
+            let f = surface_grid.lookup(semantic, at);
+            let feature = semantic_output(surface, &semantic_hidden(surface, &f));
+            let mut best = -1e30;
+            for c in 0..p.classes {
+                let logit = class_logit(decoders, &feature, p.classes, c);
+                if logit > best {
+                    best = logit;
+                    best_class = c;
+                }
+            }
+        }
+        store_f32(&values[i * 8], distance);
+        store_u32(&values[i * 8 + 1], best_class);
+        for k in 0..3 {
+            store_f32(&values[i * 8 + 4 + k], rgb[k]);
+        }
+    });
+}

@@ -1,0 +1,82 @@
+//! Pixel and ray sampling.
+use super::CpuDispatch;
+use super::shared::{FLAG_DENSE, FLAG_GUIDED, RAY_MASKED, RAY_WORDS, Ray, random_u32};
+use crate::{kernels::store_u32, layout::FieldParams};
+
+kernel! {
+    /// Draws the pixels of a batch and makes their world rays.
+    pub static SAMPLE_RAYS = "sample_rays" {
+        workgroup_size: 64,
+        params: FieldParams,
+        twin: twin,
+        bindings: [
+            poses: Read,
+            window: Read,
+            color_images: Read,
+            depth_images: Read,
+            rays: ReadWrite,
+        ],
+    }
+}
+
+fn twin(dispatch: &CpuDispatch<'_>) {
+    let p: FieldParams = dispatch.params();
+    let (poses, window) = (dispatch.read_f32(0), dispatch.read_u32(1));
+    let (color_images, depth_images) = (dispatch.read_u32(2), dispatch.read_u32(3));
+    let out = dispatch.write(4);
+    let pixels = p.width * p.height;
+    let depth_stride = pixels.div_ceil(2);
+    let raw_depth = |slot: u32, pixel: u32| {
+        (depth_images[(slot * depth_stride + pixel / 2) as usize] >> (16 * (pixel & 1))) & 0xffff
+    };
+    dispatch.for_each_invocation(|id| {
+        let index = id as u32;
+        if index >= p.rays {
+            return;
+        }
+        let frame = index / p.rays_per_frame;
+        let slot = window[frame as usize] & 0x7fff_ffff;
+        let mut pixel = (p.first.wrapping_add(index)) % pixels;
+        let mut raw = 0;
+        if p.flags & FLAG_DENSE == 0 {
+            pixel = random_u32(p.seed, p.iteration, index, 0) % pixels;
+            raw = raw_depth(slot, pixel);
+            if raw == 0 {
+                pixel = random_u32(p.seed, p.iteration, index, 1) % pixels;
+                raw = raw_depth(slot, pixel);
+            }
+        } else if p.flags & FLAG_GUIDED != 0 {
+            raw = raw_depth(slot, pixel);
+        }
+        let d = [
+            ((pixel % p.width) as f32 - p.cx) / p.fx,
+            ((pixel / p.width) as f32 - p.cy) / p.fy,
+            1.0,
+        ];
+        let m = &poses[slot as usize * 12..slot as usize * 12 + 12];
+        let row = |i: usize| m[i] * d[0] + m[i + 1] * d[1] + m[i + 2] * d[2];
+        let c = if p.flags & (FLAG_DENSE | FLAG_GUIDED) == FLAG_DENSE {
+            0xff00_0000
+        } else {
+            color_images[(slot * pixels + pixel) as usize]
+        };
+        let mut ray = Ray {
+            origin: [m[9], m[10], m[11]],
+            depth: raw as f32 * p.depth_unit,
+            direction: [row(0), row(3), row(6)],
+            frame,
+            color: [0, 8, 16].map(|shift| ((c >> shift) & 255) as f32 / 255.0),
+            label: c >> 24,
+        };
+        let hit = ray.at(ray.depth);
+        let outside = (0..3).any(|k| hit[k] < p.box_min[k] || hit[k] > p.box_max[k]);
+        if outside && p.flags & FLAG_DENSE == 0 {
+            ray.frame |= RAY_MASKED;
+            ray.depth = 0.0;
+            ray.label = 255;
+        }
+        for (k, word) in ray.words().into_iter().enumerate() {
+            store_u32(&out[id * RAY_WORDS + k], word);
+        }
+    });
+}

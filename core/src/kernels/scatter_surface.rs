@@ -1,0 +1,85 @@
+//! Adds feature gradients into the appearance and semantic planes, fixed point.
+use super::scatter_geometry::add_quanta;
+use super::shared::{Grid, Ray, plane_corners};
+use super::CpuDispatch;
+use crate::{
+    layout::{
+        FieldParams, RAY_STATE_FLOATS, STATE_APPEARANCE_GRADIENT, STATE_SEMANTIC_GRADIENT,
+    },
+};
+
+kernel! {
+    /// Scatter of the composited features' gradients, weighted by the intervals.
+    pub static SCATTER_SURFACE = "scatter_surface" {
+        workgroup_size: 64,
+        params: FieldParams,
+        twin: twin,
+        bindings: [
+            rays: Read,
+            depths: Read,
+            weights: Read,
+            ray_state: Read,
+            gradient_appearance: ReadWrite,
+            gradient_semantic: ReadWrite,
+            status: ReadWrite,
+        ],
+    }
+}
+
+fn twin(dispatch: &CpuDispatch<'_>) {
+    let p: FieldParams = dispatch.params();
+    let (rays, depths) = (dispatch.read_f32(0), dispatch.read_f32(1));
+    let (weights, ray_state) = (dispatch.read_f32(2), dispatch.read_f32(3));
+    let targets = [dispatch.write(4), dispatch.write(5)];
+    let status = dispatch.write(6);
+    let grid = Grid::surface(&p);
+    let n = p.samples as usize;
+    dispatch.for_each_invocation(|job| {
+        if job >= p.rays as usize * 12 {
+            return;
+        }
+        let (id, part) = (job % p.rays as usize, job / p.rays as usize);
+        let (plane, level, modality) = (part % 3, (part / 3) % 2, part / 6);
+        let ray = Ray::load(rays, id);
+        if ray.masked() || (modality == 1 && ray.label >= p.classes) {
+            return;
+        }
+        let (scale, state) = if modality == 1 {
+            (p.scale_semantic, STATE_SEMANTIC_GRADIENT)
+        } else {
+            (p.scale_appearance, STATE_APPEARANCE_GRADIENT)
+        };
+        let g = &ray_state[id * RAY_STATE_FLOATS + state as usize * 4 + level * 16..][..16];
+        let mut held = [usize::MAX; 4];
+        let mut sums = [0.0_f32; 4];
+        let flush = |held: [usize; 4], sums: &[f32; 4]| {
+            if held[0] == usize::MAX {
+                return;
+            }
+            for c in 0..4 {
+                if sums[c] != 0.0 {
+                    let (first, scale) = (held[c] * 16, sums[c] * scale);
+                    let limit = p.contribution_limit;
+                    add_quanta(targets[modality], status, first, g, scale, limit);
+                }
+            }
+        };
+        for i in 0..n - 1 {
+            let w = weights[id * n + i];
+            if w <= p.min_weight {
+                continue;
+            }
+            let z = 0.5 * (depths[id * n + i] + depths[id * n + i + 1]);
+            let c = plane_corners(plane, grid.local(ray.at(z), level), grid.levels[level]);
+            if c.cell[0] != held[0] {
+                flush(held, &sums);
+                held = c.cell;
+                sums = [0.0; 4];
+            }
+            for corner in 0..4 {
+                sums[corner] += c.weight[corner] * w;
+            }
+        }
+        flush(held, &sums);
+    });
+}

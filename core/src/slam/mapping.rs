@@ -1,0 +1,289 @@
+//! Adding a frame to the map: bounds, keyframes, windows, optimisation, corrected poses.
+use super::{Losses, Observation, Slam, SlamError};
+use crate::{
+    config::Tracker,
+    device::{Batch, Device, Rates, WINDOW_MAX},
+    field::FieldShape,
+    frame::{Bounds, Frame},
+    kernels::shared::{FLAG_GUIDED, FLAG_MAP, FLAG_POSE, random_u32},
+    keyframe::{Keyframe, overlap, sample_points},
+    layout::RAY_OUT_FLOATS,
+    recording::Recording,
+};
+use alloc::{collections::BTreeSet, vec::Vec};
+use glam::DVec3;
+
+/// Depth images kept for culling are at most this wide.
+const OBSERVATION_WIDTH: u32 = 160;
+/// Iterations recorded at once: long enough to amortise, short enough for watchdogs.
+const ITERATIONS_PER_RECORDING: u32 = 4;
+/// Joint pose refinement needs more keyframes than this (NICE-SLAM).
+const REFINE_AFTER: usize = 4;
+
+/// By how much the kept depth images are smaller.
+pub(super) fn observation_step(width: u32) -> u32 {
+    width.div_ceil(OBSERVATION_WIDTH).max(1)
+}
+
+/// Box of world points without the outermost 0.2 % on each side.
+fn robust_box(points: &[DVec3]) -> Option<Bounds> {
+    if points.is_empty() {
+        return None;
+    }
+    let (mut min, mut max) = (DVec3::ZERO, DVec3::ZERO);
+    let cut = points.len() / 500;
+    for k in 0..3 {
+        let mut v: Vec<f64> = points.iter().map(|p| p[k]).collect();
+        v.sort_by(f64::total_cmp);
+        min[k] = v[cut];
+        max[k] = v[v.len() - 1 - cut];
+    }
+    Some(Bounds { min, max })
+}
+
+impl Slam {
+    /// Maps the frame tracked last. Returns the losses of the last iteration, and whether the
+    /// frame became a keyframe.
+    pub(super) async fn map(
+        &mut self,
+        frame: &Frame,
+        reference: bool,
+    ) -> Result<(Losses, bool), SlamError> {
+        let Some(pose) = self.frames.last().map(|f| f.world_from_camera) else {
+            return Err(SlamError::NoMap);
+        };
+        let (camera, unit) = (self.info.camera, self.info.depth_unit_m);
+        let seen = sample_points(frame, &camera, unit, 20_000, self.config.seed);
+        let world: Vec<DVec3> = seen
+            .iter()
+            .map(|p| pose.transform_point(DVec3::new(p[0].into(), p[1].into(), p[2].into())))
+            .collect();
+        self.fit_bounds(&world, pose.translation).await?;
+        let Some(slot) = self.take_slot() else {
+            return Err(SlamError::Frame {
+                frame: frame.index,
+                field: "keyframes",
+                found: "no storage for another frame".into(),
+                expected: "a larger keyframes.budget_mib".into(),
+            });
+        };
+        let device = self.device()?;
+        let mut r = Recording::default();
+        device.upload_frame(&mut r, slot, frame);
+        device.engine.submit(&r)?;
+
+        let first = self.keyframes.is_empty();
+        let since = self.keyframes.last().map_or(0, |k| frame.index - k.frame);
+        let keyframe = first || reference || since >= self.config.keyframes.every as usize;
+        self.keyframes.push(Keyframe { frame: frame.index, slot, world_from_camera: pose });
+        let step = observation_step(camera.width) as usize;
+        let (w, h) = (camera.width as usize, camera.height as usize);
+        let depth = (0..h / step)
+            .flat_map(|v| (0..w / step).map(move |u| (u, v)))
+            .map(|(u, v)| frame.depth[(v * step + (step - 1) / 2) * w + u * step + (step - 1) / 2])
+            .collect();
+        self.observations.push(Observation { frame: frame.index, depth });
+
+        let m = &self.config.mapping;
+        let (iterations, factor) =
+            if first { (m.first_iterations, m.first_rate_factor) } else { (m.iterations, 1.0) };
+        let near: Vec<usize> = (0..self.keyframes.len() - 1)
+            .filter(|&i| {
+                let k = &self.keyframes[i];
+                overlap(&world, &camera, &k.world_from_camera) > 0.05
+            })
+            .collect();
+        let rates = Rates { planes: m.rate_planes * factor, decoders: m.rate_decoders * factor };
+        let losses = self.optimise(iterations, rates, &near).await?;
+        self.last_mapped = Some(frame.index);
+        if !keyframe && let Some(k) = self.keyframes.pop() {
+            self.free_slots.push(k.slot);
+        }
+        Ok((losses, keyframe))
+    }
+
+    /// Goes over all keyframes once more, with falling rates.
+    ///
+    /// # Errors
+    /// Engine failures. Nothing happens without keyframes.
+    pub async fn finish(&mut self) -> Result<(), SlamError> {
+        if self.keyframes.is_empty() {
+            return Ok(());
+        }
+        self.follow_odometer();
+        let m = self.config.mapping.clone();
+        let all: Vec<usize> = (0..self.keyframes.len()).collect();
+        let mut left = m.final_iterations;
+        while left > 0 {
+            let n = left.min(20);
+            let factor = 0.1 + 0.9 * f64::from(left) / f64::from(m.final_iterations);
+            let rates =
+                Rates { planes: m.rate_planes * factor, decoders: m.rate_decoders * factor };
+            self.optimise(n, rates, &all).await?;
+            left -= n;
+        }
+        self.follow_odometer();
+        Ok(())
+    }
+
+    /// Makes the map, or grows it, so that it holds the points and the camera.
+    async fn fit_bounds(&mut self, world: &[DVec3], camera: DVec3) -> Result<(), SlamError> {
+        let margin = DVec3::splat(self.config.field.margin_m);
+        let given = self.info.bounds.filter(|_| self.config.field.use_given_bounds);
+        if self.device.is_none() {
+            let bounds = match given {
+                Some(b) => b,
+                None => {
+                    let b = robust_box(world).unwrap_or(Bounds { min: camera, max: camera });
+                    Bounds { min: b.min.min(camera) - margin, max: b.max.max(camera) + margin }
+                }
+            };
+            let shape = FieldShape::new(bounds, &self.config.field);
+            let Some(engine) = self.engine.take() else { return Err(SlamError::NoMap) };
+            let classes = self.info.classes.len() as u32;
+            let (c, unit) = (self.info.camera, self.info.depth_unit_m);
+            let device = Device::new(engine, &self.config, c, unit, classes, shape)?;
+            self.free_slots = (1..device.slots).rev().collect();
+            self.device = Some(device);
+            return Ok(());
+        }
+        if given.is_some() || self.bounds_refused {
+            return Ok(());
+        }
+        let Some(b) = robust_box(world) else { return Ok(()) };
+        let held = Bounds { min: b.min.min(camera), max: b.max.max(camera) };
+        let (config, seed) = (self.config.field.clone(), self.config.seed);
+        let device = self.device()?;
+        if device.shape.grown(held, &config).is_none() {
+            return Ok(());
+        }
+        // Grow with the margin, so that the next frames fit as well.
+        let wanted = Bounds { min: held.min - margin, max: held.max + margin };
+        if let Some(shape) = device.shape.grown(wanted, &config) {
+            if shape.surface_floats().max(shape.geometry_floats())
+                > device.engine.max_buffer_words()
+            {
+                // The map stays as it is; surfaces outside it are ignored.
+                self.bounds_refused = true;
+                return Ok(());
+            }
+            device.grow(shape, seed).await?;
+        }
+        Ok(())
+    }
+
+    /// Whether the map stopped growing because it would pass the device's limits.
+    pub fn bounds_refused(&self) -> bool {
+        self.bounds_refused
+    }
+
+    /// Optimises map and poses over windows drawn from the keyframes `near`, the last keyframe
+    /// (the current frame) and the two before it.
+    async fn optimise(
+        &mut self,
+        iterations: u32,
+        rates: Rates,
+        near: &[usize],
+    ) -> Result<Losses, SlamError> {
+        let m = self.config.mapping.clone();
+        let s = self.config.sampling.clone();
+        let loss = self.config.loss.clone();
+        let seed = self.config.seed;
+        let n = self.keyframes.len();
+        let refine =
+            m.refine_poses && self.config.tracking.tracker != Tracker::Truth && n > REFINE_AFTER;
+        let window_size = (m.window as usize).min(WINDOW_MAX).min(n);
+        let keyframes: Vec<(u32, _)> =
+            self.keyframes.iter().map(|k| (k.slot, k.world_from_camera)).collect();
+        let first_iteration = self.iteration;
+        self.iteration += iterations;
+        let last_frame = self.keyframes.last().map_or(0, |k| k.frame);
+        let device = self.device()?;
+        let mut touched = BTreeSet::new();
+        let mut r = Recording::default();
+        for (slot, pose) in &keyframes {
+            device.upload_pose(&mut r, *slot, pose);
+        }
+        let mut rays = 0;
+        for i in 0..iterations {
+            let iteration = first_iteration + i;
+            let mut chosen: BTreeSet<usize> = (n.saturating_sub(3)..n).collect();
+            let mut pool: Vec<usize> =
+                near.iter().copied().filter(|k| !chosen.contains(k)).collect();
+            let mut draw = 0;
+            while chosen.len() < window_size && !pool.is_empty() {
+                let k = random_u32(seed, iteration, draw, 21) as usize % pool.len();
+                chosen.insert(pool.swap_remove(k));
+                draw += 1;
+            }
+            while chosen.len() > window_size {
+                chosen.pop_first();
+            }
+            let oldest = chosen.first().copied();
+            let window: Vec<(u32, bool)> = chosen
+                .iter()
+                .map(|&k| (keyframes[k].0, !refine || k == 0 || Some(k) == oldest))
+                .collect();
+            touched.extend(chosen);
+            device.upload_window(&mut r, &window);
+            let frames = window.len() as u32;
+            let batch = Batch {
+                frames,
+                rays_per_frame: m.rays / frames,
+                stratified: s.stratified,
+                surface: s.surface,
+                flags: FLAG_GUIDED | FLAG_MAP | if refine { FLAG_POSE } else { 0 },
+                loss: &loss,
+                iteration,
+                first: 0,
+            };
+            rays = batch.frames * batch.rays_per_frame;
+            device.record_forward(&mut r, &batch);
+            device.record_backward(&mut r, &batch);
+            if refine {
+                let (v, w) = (m.rate_translation_m, m.rate_rotation_rad);
+                device.record_pose_step(&mut r, &batch, v, w, false);
+            }
+            device.record_step(&mut r, &batch, rates);
+            if (i + 1) % ITERATIONS_PER_RECORDING == 0 || i + 1 == iterations {
+                device.engine.submit(&r)?;
+                r = Recording::default();
+            }
+        }
+        let losses = read_losses(device, rays, &loss).await?;
+        if device.read_status().await? & crate::kernels::adam::STATUS_NOT_FINITE != 0 {
+            return Err(SlamError::NotFinite { frame: last_frame });
+        }
+        if refine {
+            let slots = device.slots;
+            let poses = device.read_poses(slots).await?;
+            for k in touched {
+                let slot = keyframes[k].0 as usize;
+                if let Some(Some(pose)) = poses.get(slot) {
+                    self.keyframes[k].world_from_camera = *pose;
+                    self.odometer.set_frame_pose(self.keyframes[k].frame, *pose);
+                }
+            }
+        }
+        Ok(losses)
+    }
+}
+
+/// Weighted mean losses of the last batch.
+async fn read_losses(
+    device: &mut Device,
+    rays: u32,
+    loss: &crate::config::LossConfig,
+) -> Result<Losses, SlamError> {
+    let out = device.read_ray_out(rays).await?;
+    let mut l = Losses::default();
+    let inv = 1.0 / f64::from(rays.max(1));
+    for ray in out.chunks_exact(RAY_OUT_FLOATS) {
+        l.color += f64::from(ray[6]) * loss.color * inv;
+        l.depth += f64::from(ray[7]) * loss.depth * inv;
+        l.semantic += f64::from(ray[8]) * loss.semantic * inv;
+        l.sdf += f64::from(ray[9]) * inv;
+    }
+    l.total = l.color + l.depth + l.semantic + l.sdf;
+    Ok(l)
+}

@@ -1,0 +1,302 @@
+//! The whole system: frames in, poses and a map out.
+//!
+//! [`Slam::process`] tracks a frame, maps it when it is due, and reports. Nothing here waits for a
+//! clock, a file or a thread: the host owns those.
+mod checkpoint;
+mod mapping;
+mod output;
+mod tracking;
+
+pub use checkpoint::{Checkpoint, Dtype, Tensor};
+pub use output::View;
+
+use crate::{
+    config::{Config, ConfigError, Tracker},
+    device::Device,
+    engine::{Engine, EngineError},
+    frame::{Bounds, Frame, SequenceInfo},
+    keyframe::Keyframe,
+    mesh::MeshError,
+    pose::Pose,
+    track::odometry::{Odometer, OdometryConfig, OdometryError},
+};
+use alloc::{format, string::String, vec::Vec};
+
+/// What a run could not do.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum SlamError {
+    /// The engine failed.
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+    /// The configuration is not usable.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// Tracking could not even be tried.
+    #[error(transparent)]
+    Odometry(#[from] OdometryError),
+    /// Meshing failed.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// A frame does not fit the sequence.
+    #[error("frame {frame}: {field}: found {found}, expected {expected}")]
+    Frame {
+        /// `Frame::index`.
+        frame: usize,
+        /// What part of it.
+        field: &'static str,
+        /// What it is.
+        found: String,
+        /// What it should be.
+        expected: String,
+    },
+    /// Asked for something that needs a map before the first frame.
+    #[error("there is no map yet: process a frame first")]
+    NoMap,
+    /// The map holds values that are not finite.
+    #[error("the map is not finite after frame {frame}: lower the learning rates")]
+    NotFinite {
+        /// Last frame mapped.
+        frame: usize,
+    },
+    /// A checkpoint that cannot be continued from.
+    #[error("checkpoint: {field}: found {found}, expected {expected}")]
+    Checkpoint {
+        /// Tensor or metadata entry.
+        field: String,
+        /// What is there.
+        found: String,
+        /// What should be there.
+        expected: String,
+    },
+}
+
+/// How a frame's pose came about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TrackingStatus {
+    /// The first frame: its pose defines the world.
+    First,
+    /// Located.
+    Tracked,
+    /// Not located; its pose is a guess and the map ignores it.
+    Lost,
+}
+
+/// The pose of one frame.
+#[derive(Clone, Copy, Debug)]
+pub struct PoseEstimate {
+    /// `Frame::index`.
+    pub frame: usize,
+    /// Time stamp \[s\].
+    pub time_s: f64,
+    /// The pose.
+    pub world_from_camera: Pose,
+    /// How it came about.
+    pub status: TrackingStatus,
+}
+
+/// Mean losses of the last mapping iteration, weighted as optimised.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Losses {
+    /// Sum of the others.
+    pub total: f64,
+    /// Signed distance.
+    pub sdf: f64,
+    /// Rendered depth.
+    pub depth: f64,
+    /// Rendered colour.
+    pub color: f64,
+    /// Cross-entropy.
+    pub semantic: f64,
+}
+
+/// What happened to a frame.
+#[derive(Clone, Debug)]
+pub struct FrameReport {
+    /// How its pose came about.
+    pub status: TrackingStatus,
+    /// Its pose at this moment; mapping may correct it later.
+    pub world_from_camera: Pose,
+    /// Time of tracking \[s\]; 0 without a clock.
+    pub tracking_s: f64,
+    /// Time of mapping \[s\]; 0 without a clock.
+    pub mapping_s: f64,
+    /// Time of both \[s\].
+    pub total_s: f64,
+    /// Losses, when the frame was mapped.
+    pub losses: Option<Losses>,
+    /// Whether it became a keyframe.
+    pub keyframe: bool,
+}
+
+/// The depth image of a mapped frame at reduced size: what was observed, for culling meshes.
+#[derive(Clone, Debug)]
+pub(crate) struct Observation {
+    pub frame: usize,
+    pub depth: Vec<u16>,
+}
+
+/// The system.
+pub struct Slam {
+    config: Config,
+    info: SequenceInfo,
+    /// Before the first frame, whose depth may decide the bounds.
+    engine: Option<Engine>,
+    device: Option<Device>,
+    odometer: Odometer,
+    frames: Vec<PoseEstimate>,
+    keyframes: Vec<Keyframe>,
+    observations: Vec<Observation>,
+    free_slots: Vec<u32>,
+    /// Batches so far: the counter of the random numbers.
+    iteration: u32,
+    last_mapped: Option<usize>,
+    bounds_refused: bool,
+    clock: Option<fn() -> f64>,
+}
+
+/// Slot whose pose is used for tracking and views; it has no images.
+pub(crate) const VIEW_SLOT: u32 = 0;
+
+impl Slam {
+    /// A system that has seen nothing. The device's buffers are made with the first frame.
+    ///
+    /// # Errors
+    /// [`SlamError::Config`].
+    pub async fn new(
+        engine: Engine,
+        config: Config,
+        info: &SequenceInfo,
+    ) -> Result<Slam, SlamError> {
+        config.validate()?;
+        Ok(Slam {
+            config,
+            info: info.clone(),
+            engine: Some(engine),
+            device: None,
+            odometer: Odometer::new(OdometryConfig::default()),
+            frames: Vec::new(),
+            keyframes: Vec::new(),
+            observations: Vec::new(),
+            free_slots: Vec::new(),
+            iteration: 0,
+            last_mapped: None,
+            bounds_refused: false,
+            clock: None,
+        })
+    }
+
+    /// Gives the system a clock \[s\]; without one reports carry no times.
+    pub fn set_clock(&mut self, clock: fn() -> f64) {
+        self.clock = Some(clock);
+    }
+
+    /// Track a frame and, when it is due, map it.
+    ///
+    /// # Errors
+    /// A frame of another size, a first frame without depth or pose, engine failures. A frame that
+    /// cannot be located is no error: its status is [`TrackingStatus::Lost`].
+    pub async fn process(&mut self, frame: &Frame) -> Result<FrameReport, SlamError> {
+        self.check(frame)?;
+        let now = |s: &Slam| s.clock.map_or(0.0, |c| c());
+        let start = now(self);
+        let (status, new_reference) = self.track(frame).await?;
+        let tracked = now(self);
+        let due = frame.index.is_multiple_of(self.config.mapping.every as usize);
+        let mut losses = None;
+        let mut keyframe = false;
+        if status != TrackingStatus::Lost && (due || new_reference) {
+            let mapped = self.map(frame, new_reference).await?;
+            losses = Some(mapped.0);
+            keyframe = mapped.1;
+        }
+        let end = now(self);
+        self.follow_odometer();
+        let world_from_camera = self.frames.last().map_or(Pose::IDENTITY, |f| f.world_from_camera);
+        Ok(FrameReport {
+            status,
+            world_from_camera,
+            tracking_s: tracked - start,
+            mapping_s: end - tracked,
+            total_s: end - start,
+            losses,
+            keyframe,
+        })
+    }
+
+    /// The poses so far, with every correction.
+    pub fn trajectory(&self) -> Vec<PoseEstimate> {
+        self.frames.clone()
+    }
+
+    /// The keyframes kept for mapping.
+    pub fn keyframes(&self) -> &[Keyframe] {
+        &self.keyframes
+    }
+
+    /// The configuration.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// What is known of the sequence.
+    pub fn info(&self) -> &SequenceInfo {
+        &self.info
+    }
+
+    /// The map's box \[m\], once there is a map.
+    pub fn bounds(&self) -> Option<Bounds> {
+        self.device.as_ref().map(|d| d.shape.bounds)
+    }
+
+    /// Bytes of device buffers.
+    pub fn memory_bytes(&self) -> usize {
+        self.device.as_ref().map_or(0, |d| d.engine.allocated_bytes() as usize)
+    }
+
+    pub(crate) fn device(&mut self) -> Result<&mut Device, SlamError> {
+        self.device.as_mut().ok_or(SlamError::NoMap)
+    }
+
+    fn check(&self, frame: &Frame) -> Result<(), SlamError> {
+        let pixels = self.info.camera.pixels();
+        let found = [
+            ("colour image", frame.color.len()),
+            ("depth image", frame.depth.len()),
+            ("label image", frame.labels.as_ref().map_or(pixels, Vec::len)),
+        ];
+        for (field, n) in found {
+            if n != pixels {
+                return Err(SlamError::Frame {
+                    frame: frame.index,
+                    field,
+                    found: format!("{n} pixels"),
+                    expected: format!("{pixels} pixels"),
+                });
+            }
+        }
+        if frame.truth.is_some_and(|p| !p.is_finite()) {
+            return Err(SlamError::Frame {
+                frame: frame.index,
+                field: "true pose",
+                found: "a number that is not finite".into(),
+                expected: "finite numbers, or no pose".into(),
+            });
+        }
+        Ok(())
+    }
+
+    /// Takes over the poses of all frames from the odometer, which moves them with its keyframes.
+    fn follow_odometer(&mut self) {
+        if self.config.tracking.tracker == Tracker::Truth {
+            return;
+        }
+        for (entry, (_, pose, _)) in self.frames.iter_mut().zip(self.odometer.trajectory()) {
+            entry.world_from_camera = pose;
+        }
+        for k in &mut self.keyframes {
+            if let Some(f) = self.frames.get(k.frame) {
+                k.world_from_camera = f.world_from_camera;
+            }
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! Locating a frame: odometry, then refinement against the field.
+use super::{PoseEstimate, Slam, SlamError, TrackingStatus, VIEW_SLOT};
+use crate::{
+    config::Tracker,
+    device::Batch,
+    frame::Frame,
+    kernels::{
+        pose_step::POSE_BEST_LOSS,
+        shared::{FLAG_GUIDED, FLAG_MASK, FLAG_POSE},
+    },
+    keyframe::sample_points,
+    pose::Pose,
+    recording::Recording,
+    track::{
+        gauss_newton::{self, Guard},
+        odometry::RgbdPyramid,
+    },
+};
+
+impl Slam {
+    /// Adds the frame's pose to the trajectory. Second value: the odometer took the frame as a
+    /// reference, so the map should have it, too.
+    pub(super) async fn track(
+        &mut self,
+        frame: &Frame,
+    ) -> Result<(TrackingStatus, bool), SlamError> {
+        let push = |frames: &mut alloc::vec::Vec<PoseEstimate>, pose, status| {
+            frames.push(PoseEstimate {
+                frame: frame.index,
+                time_s: frame.time_s,
+                world_from_camera: pose,
+                status,
+            });
+        };
+        let first = self.frames.is_empty();
+        if self.config.tracking.tracker == Tracker::Truth {
+            let status = match (first, frame.truth) {
+                (_, None) if first => {
+                    return Err(SlamError::Frame {
+                        frame: frame.index,
+                        field: "true pose",
+                        found: "none".into(),
+                        expected: "a pose, since the tracker is `truth`".into(),
+                    });
+                }
+                (_, None) => TrackingStatus::Lost,
+                (true, _) => TrackingStatus::First,
+                (false, _) => TrackingStatus::Tracked,
+            };
+            let last = self.frames.last().map_or(Pose::IDENTITY, |f| f.world_from_camera);
+            push(&mut self.frames, frame.truth.unwrap_or(last), status);
+            return Ok((status, first));
+        }
+        let config = self.odometer.config().pyramid.clone();
+        let pyramid = RgbdPyramid::new(frame, &self.info.camera, self.info.depth_unit_m, &config)?;
+        let start = first.then(|| frame.truth.unwrap_or(Pose::IDENTITY));
+        let found = self.odometer.track(pyramid, start)?;
+        let mut pose = found.world_from_camera;
+        if found.lost {
+            push(&mut self.frames, pose, TrackingStatus::Lost);
+            return Ok((TrackingStatus::Lost, false));
+        }
+        if first {
+            push(&mut self.frames, pose, TrackingStatus::First);
+            return Ok((TrackingStatus::First, true));
+        }
+        let refined = match self.config.tracking.tracker {
+            Tracker::Align => self.align(frame, &pose).await?,
+            Tracker::Render => self.render_track(frame, &pose).await?,
+            Tracker::Truth => None,
+        };
+        if let Some(refined) = refined {
+            pose = refined;
+            self.odometer.set_last_pose(pose);
+        }
+        push(&mut self.frames, pose, TrackingStatus::Tracked);
+        Ok((TrackingStatus::Tracked, found.keyframe.is_some()))
+    }
+
+    /// `align`: damped Gauss-Newton against the field, starting and held near the odometry's pose.
+    /// `None` when a guard refused the result.
+    async fn align(&mut self, frame: &Frame, start: &Pose) -> Result<Option<Pose>, SlamError> {
+        let t = self.config.tracking.clone();
+        if t.align_iterations == 0 || t.align_field_weight == 0.0 {
+            return Ok(None);
+        }
+        let (camera, unit, seed) = (self.info.camera, self.info.depth_unit_m, self.config.seed);
+        let points = sample_points(frame, &camera, unit, t.align_pixels as usize, seed);
+        let device = self.device()?;
+        let mut r = Recording::default();
+        device.upload_pixels(&mut r, &points);
+        device.engine.submit(&r)?;
+        let guard = Guard { offered: points.len(), ..Guard::default() };
+        let mut solver = gauss_newton::Solver::new(*start, t.align_field_weight, guard);
+        for _ in 0..t.align_iterations {
+            let sums = device.align(&solver.candidate(), points.len() as u32).await?;
+            if solver.step(&sums) {
+                break;
+            }
+        }
+        Ok(solver.result())
+    }
+
+    /// `render`: Adam on the pose through volume rendering; the pose of the smallest loss is kept.
+    async fn render_track(
+        &mut self,
+        frame: &Frame,
+        start: &Pose,
+    ) -> Result<Option<Pose>, SlamError> {
+        let t = self.config.tracking.clone();
+        let s = self.config.sampling.clone();
+        let Some(slot) = self.take_slot() else { return Ok(None) };
+        let first_iteration = self.iteration;
+        self.iteration += t.render_iterations + 1;
+        let device = self.device()?;
+        let mut r = Recording::default();
+        device.upload_frame(&mut r, slot, frame);
+        device.upload_pose(&mut r, slot, start);
+        device.upload_window(&mut r, &[(slot, false)]);
+        // One pass more than steps: the last step's pose is judged, too.
+        for i in 0..=t.render_iterations {
+            let batch = Batch {
+                frames: 1,
+                rays_per_frame: t.render_rays,
+                stratified: s.stratified,
+                surface: s.surface,
+                flags: FLAG_GUIDED | FLAG_POSE | FLAG_MASK,
+                loss: &t.render_loss,
+                iteration: first_iteration + i,
+                first: 0,
+            };
+            device.record_forward(&mut r, &batch);
+            device.record_backward(&mut r, &batch);
+            let (v, w) = (t.render_rate_translation_m, t.render_rate_rotation_rad);
+            device.record_pose_step(&mut r, &batch, v, w, i == 0);
+        }
+        device.engine.submit(&r)?;
+        let state = device.read_pose_state(slot).await?;
+        self.free_slots.push(slot);
+        let pose = crate::device::pose_from_words(&state[POSE_BEST_LOSS + 1..POSE_BEST_LOSS + 13]);
+        Ok(pose.filter(|_| state[POSE_BEST_LOSS] < 1e30))
+    }
+
+    /// A slot for a frame's images, dropping the least useful keyframe when all are taken.
+    pub(super) fn take_slot(&mut self) -> Option<u32> {
+        if self.free_slots.is_empty() {
+            let i = crate::keyframe::least_useful(&self.keyframes)?;
+            let dropped = self.keyframes.remove(i);
+            self.free_slots.push(dropped.slot);
+        }
+        debug_assert!(!self.free_slots.contains(&VIEW_SLOT));
+        self.free_slots.pop()
+    }
+}

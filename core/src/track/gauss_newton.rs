@@ -1,0 +1,173 @@
+//! Damped Gauss-Newton on a pose from normal equations that the device sums; solved in f64.
+use crate::{kernels::align_points::ALIGN_ROW, pose::Pose};
+
+/// When a result is not to be trusted.
+#[derive(Clone, Copy, Debug)]
+pub struct Guard {
+    /// Points offered to the field.
+    pub offered: usize,
+    /// Least share of them near a surface of the map.
+    pub min_share: f64,
+    /// Largest correction \[m\].
+    pub max_translation_m: f64,
+    /// Largest correction \[rad\].
+    pub max_rotation_rad: f64,
+}
+
+impl Default for Guard {
+    fn default() -> Self {
+        Guard { offered: 0, min_share: 0.3, max_translation_m: 0.03, max_rotation_rad: 0.03 }
+    }
+}
+
+/// Levenberg-Marquardt, one evaluation a step.
+#[derive(Clone, Debug)]
+pub struct Solver {
+    start: Pose,
+    best: Pose,
+    candidate: Pose,
+    best_cost: f64,
+    damping: f64,
+    weight: f64,
+    accepted: u32,
+    guard: Guard,
+    refused: bool,
+    last: Option<([[f64; 6]; 6], [f64; 6])>,
+}
+
+/// Solves A x = b for a symmetric positive definite A by Cholesky; `None` if it is not.
+pub fn solve6(a: &[[f64; 6]; 6], b: &[f64; 6]) -> Option<[f64; 6]> {
+    let mut l = [[0.0; 6]; 6];
+    for i in 0..6 {
+        for j in 0..=i {
+            let mut s = a[i][j];
+            for k in 0..j {
+                s -= l[i][k] * l[j][k];
+            }
+            if i == j {
+                // Written so that NaN fails.
+                if !(s > 1e-12 * a[i][i].max(1e-300)) {
+                    return None;
+                }
+                l[i][i] = num_traits::Float::sqrt(s);
+            } else {
+                l[i][j] = s / l[j][j];
+            }
+        }
+    }
+    let mut x = *b;
+    for i in 0..6 {
+        for k in 0..i {
+            x[i] -= l[i][k] * x[k];
+        }
+        x[i] /= l[i][i];
+    }
+    for i in (0..6).rev() {
+        for k in i + 1..6 {
+            x[i] -= l[k][i] * x[k];
+        }
+        x[i] /= l[i][i];
+    }
+    x.iter().all(|v| v.is_finite()).then_some(x)
+}
+
+impl Solver {
+    /// Starts at a pose. `weight` scales the sums.
+    pub fn new(start: Pose, weight: f64, guard: Guard) -> Solver {
+        Solver {
+            start,
+            best: start,
+            candidate: start,
+            best_cost: f64::INFINITY,
+            damping: 1e-4,
+            weight,
+            accepted: 0,
+            guard,
+            refused: false,
+            last: None,
+        }
+    }
+
+    /// The pose to evaluate next.
+    pub fn candidate(&self) -> Pose {
+        self.candidate
+    }
+
+    /// Takes the sums at the candidate; true when done.
+    pub fn step(&mut self, sums: &[f64; ALIGN_ROW]) -> bool {
+        let points = sums[29];
+        if !sums.iter().all(|v| v.is_finite())
+            || points < self.guard.min_share * self.guard.offered as f64
+            || points < 50.0
+        {
+            self.refused = self.accepted == 0;
+            return true;
+        }
+        let cost = (sums[27] + sums[28]) / points;
+        if cost < self.best_cost {
+            let gain = self.best_cost - cost;
+            self.best = self.candidate;
+            self.best_cost = cost;
+            self.accepted += 1;
+            self.damping = (self.damping * 0.3).max(1e-7);
+            let mut h = [[0.0; 6]; 6];
+            let mut k = 0;
+            for a in 0..6 {
+                for b in a..6 {
+                    h[a][b] = sums[k] * self.weight;
+                    h[b][a] = h[a][b];
+                    k += 1;
+                }
+            }
+            let g = core::array::from_fn(|i| -sums[21 + i] * self.weight);
+            self.last = Some((h, g));
+            if gain < 1e-4 * cost {
+                return true;
+            }
+        } else {
+            self.damping *= 10.0;
+            if self.damping > 1e3 {
+                return true;
+            }
+        }
+        let Some((mut h, g)) = self.last else { return true };
+        for (i, row) in h.iter_mut().enumerate() {
+            row[i] *= 1.0 + self.damping;
+        }
+        let Some(x) = solve6(&h, &g) else {
+            self.refused = self.accepted <= 1;
+            return true;
+        };
+        self.candidate = self.best.retract(&x);
+        x.iter().all(|v| v.abs() < 1e-6)
+    }
+
+    /// The refined pose, or `None` when a guard refused it.
+    pub fn result(&self) -> Option<Pose> {
+        let change = self.start.inverse().compose(&self.best);
+        let small = change.translation.length() <= self.guard.max_translation_m
+            && change.angle_rad() <= self.guard.max_rotation_rad;
+        (!self.refused && self.accepted > 0 && small).then_some(self.best)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn solves_and_refuses() {
+        let mut a = [[0.1; 6]; 6];
+        for i in 0..6 {
+            a[i][i] = 2.0 + i as f64;
+        }
+        let x = [1.0, -2.0, 3.0, 0.5, -0.25, 4.0];
+        let b = core::array::from_fn(|i| (0..6).map(|j| a[i][j] * x[j]).sum());
+        let y = solve6(&a, &b).unwrap();
+        for i in 0..6 {
+            assert!((x[i] - y[i]).abs() < 1e-9);
+        }
+        a[3] = [0.0; 6];
+        assert!(solve6(&a, &b).is_none());
+    }
+}

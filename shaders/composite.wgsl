@@ -1,0 +1,83 @@
+// Weights of a ray's intervals, composited depth, opacity and features. One invocation a ray.
+// Features are composited before their decoders, which then run once a ray.
+#import shared/dispatch.wgsl
+#import shared/params.wgsl
+#import shared/rays.wgsl
+#import shared/planes.wgsl
+
+@group(0) @binding(1) var<storage, read> rays: array<Ray>;
+@group(0) @binding(2) var<storage, read> depths: array<f32>;
+@group(0) @binding(3) var<storage, read> distances: array<f32>;
+@group(0) @binding(4) var<storage, read> planes_appearance: array<vec4f>;
+@group(0) @binding(5) var<storage, read> planes_semantic: array<vec4f>;
+// Weight of the interval from sample i to i + 1; the last is 0.
+@group(0) @binding(6) var<storage, read_write> weights: array<f32>;
+@group(0) @binding(7) var<storage, read_write> ray_state: array<vec4f>;
+
+#import shared/weights.wgsl
+
+@compute @workgroup_size(WORKGROUP_SIZE)
+fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let ray = linear_invocation(wid, groups, lane);
+    if (ray >= params.rays) {
+        return;
+    }
+    let r = rays[ray];
+    let base = ray * params.samples;
+    var appearance: array<vec4f, 8>;
+    var semantic: array<vec4f, 8>;
+    var transmittance = 1.0;
+    var depth = 0.0;
+    var opacity = 0.0;
+    var z0 = depths[base];
+    var phi0 = phi(distances[base]);
+    for (var i = 1u; i < params.samples; i++) {
+        let z1 = depths[base + i];
+        let phi1 = phi(distances[base + i]);
+        let alpha = interval_alpha(phi0, phi1);
+        let w = transmittance * alpha;
+        transmittance *= 1.0 - alpha;
+        let z = 0.5 * (z0 + z1);
+        weights[base + i - 1u] = w;
+        depth += w * z;
+        opacity += w;
+        if (w > params.min_weight) {
+            let local = r.origin + z * r.direction - params.box_min.xyz;
+            let g0 = local * params.surface_inv_cell.x;
+            let g1 = local * params.surface_inv_cell.y;
+#for plane in 0..3
+            {
+                let a = plane_corners(${plane}u, g0, params.surface_coarse);
+                let b = plane_corners(${plane}u, g1, params.surface_fine);
+                let ai = a.cell * 4u;
+                let bi = b.cell * 4u;
+                let aw = a.weight * w;
+                let bw = b.weight * w;
+#for q in 0..4
+                appearance[${q}] += aw.x * planes_appearance[ai.x + ${q}u] + aw.y * planes_appearance[ai.y + ${q}u]
+                    + aw.z * planes_appearance[ai.z + ${q}u] + aw.w * planes_appearance[ai.w + ${q}u];
+                appearance[${q+4}] += bw.x * planes_appearance[bi.x + ${q}u] + bw.y * planes_appearance[bi.y + ${q}u]
+                    + bw.z * planes_appearance[bi.z + ${q}u] + bw.w * planes_appearance[bi.w + ${q}u];
+#end
+                if (params.classes > 0u) {
+#for q in 0..4
+                    semantic[${q}] += aw.x * planes_semantic[ai.x + ${q}u] + aw.y * planes_semantic[ai.y + ${q}u]
+                        + aw.z * planes_semantic[ai.z + ${q}u] + aw.w * planes_semantic[ai.w + ${q}u];
+                    semantic[${q+4}] += bw.x * planes_semantic[bi.x + ${q}u] + bw.y * planes_semantic[bi.y + ${q}u]
+                        + bw.z * planes_semantic[bi.z + ${q}u] + bw.w * planes_semantic[bi.w + ${q}u];
+#end
+                }
+            }
+#end
+        }
+        z0 = z1;
+        phi0 = phi1;
+    }
+    weights[base + params.samples - 1u] = 0.0;
+    let state = ray * ${RAY_STATE_VEC4}u;
+#for q in 0..8
+    ray_state[state + ${STATE_APPEARANCE+q}u] = appearance[${q}];
+    ray_state[state + ${STATE_SEMANTIC+q}u] = semantic[${q}];
+#end
+    ray_state[state + ${STATE_DEPTH}u] = vec4f(depth, opacity, 0.0, 0.0);
+}

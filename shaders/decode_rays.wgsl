@@ -1,0 +1,137 @@
+// Decoders and class head on composited features, their losses, and the gradients back to the features.
+// One invocation a ray. Colour 32-32-3 with sigmoid, semantic feature 32-32-16, class head 16-C linear.
+#import shared/dispatch.wgsl
+#import shared/params.wgsl
+#import shared/rays.wgsl
+
+@group(0) @binding(1) var<storage, read> rays: array<Ray>;
+@group(0) @binding(2) var<storage, read> decoders: array<vec4f>;
+@group(0) @binding(3) var<storage, read_write> ray_state: array<vec4f>;
+// 3 vec4 a ray: red green blue depth | opacity, class (bits), loss colour, loss depth | loss semantic, loss distance, depth error, 0.
+@group(0) @binding(4) var<storage, read_write> ray_out: array<vec4f>;
+// C floats a ray: gradient at the class logits.
+@group(0) @binding(5) var<storage, read_write> logits_gradient: array<f32>;
+
+#import shared/surface.wgsl
+
+@compute @workgroup_size(WORKGROUP_SIZE)
+fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    load_surface_decoders(lane);
+    let ray = linear_invocation(wid, groups, lane);
+    if (ray >= params.rays) {
+        return;
+    }
+    let r = rays[ray];
+    let masked = (r.frame & 0x80000000u) != 0u;
+    let inv_rays = 1.0 / f32(params.rays);
+    let state = ray * ${RAY_STATE_VEC4}u;
+    var f: array<vec4f, 8>;
+#for q in 0..8
+    f[${q}] = ray_state[state + ${STATE_APPEARANCE+q}u];
+#end
+    var hc = color_hidden(f);
+    let rgb = color_output(hc);
+    let geometry = ray_state[state + ${STATE_DEPTH}u];
+
+    // Colour: mean squared error over the three channels, on rays that meet a surface.
+    let difference = select(rgb - r.color, vec3f(0.0), masked);
+    let loss_color = dot(difference, difference) / 3.0;
+    let drgb = difference * (2.0 / 3.0 * params.weight_color * inv_rays);
+    let dc = vec4f(drgb * rgb * (1.0 - rgb), 0.0);
+#for q in 0..8
+    {
+        let t = vec4f(dot(sw[${264+q*4}], dc), dot(sw[${265+q*4}], dc), dot(sw[${266+q*4}], dc), dot(sw[${267+q*4}], dc));
+        let d = select(vec4f(0.0), t, hc[${q}] > vec4f(0.0));
+        ray_state[state + ${STATE_COLOR_HIDDEN+q}u] = hc[${q}];
+        ray_state[state + ${STATE_COLOR_HIDDEN_DELTA+q}u] = d;
+        hc[${q}] = d;
+    }
+#end
+    ray_state[state + ${STATE_COLOR_DELTA}u] = dc;
+    // dL/d(appearance features) = W1 d; inputs outer, so each is one row of dots.
+#for q in 0..8
+    {
+        var t = vec4f(0.0);
+#for c in 0..4
+        t[${c}] = dot8(${(q*4+c)*8}u, hc);
+#end
+        ray_state[state + ${STATE_APPEARANCE_GRADIENT+q}u] = t;
+    }
+#end
+
+    // Depth: squared error on rays with a sensor depth. Its gradient is stored unweighted by the interval.
+    var loss_depth = 0.0;
+    var ddepth = 0.0;
+    if (r.depth > 0.0) {
+        let e = geometry.x - r.depth;
+        loss_depth = e * e;
+        ddepth = 2.0 * e * params.weight_depth * inv_rays;
+    }
+    ray_state[state + ${STATE_DEPTH}u] = vec4f(geometry.xy, ddepth, 0.0);
+
+    // Semantics: cross-entropy at the class head; the gradient stops at the interval weights.
+    var loss_semantic = 0.0;
+    var best_class = 255u;
+    if (params.classes > 0u) {
+#for q in 0..8
+        f[${q}] = ray_state[state + ${STATE_SEMANTIC+q}u];
+#end
+        var hs = semantic_hidden(f);
+        var feature = semantic_output(hs);
+        var best = -1e30;
+        var sum = 0.0;
+        var own = 0.0;
+        for (var c = 0u; c < params.classes; c++) {
+            let logit = class_logit(feature, c);
+            if (logit > best) {
+                sum = sum * exp(best - logit) + 1.0;
+                best = logit;
+                best_class = c;
+            } else {
+                sum += exp(logit - best);
+            }
+            own = select(own, logit, c == r.label);
+        }
+        let labelled = r.label < params.classes;
+        var df: array<vec4f, 4>;
+        if (labelled) {
+            loss_semantic = log(sum) + best - own;
+        }
+        let scale = select(0.0, params.weight_semantic * inv_rays, labelled);
+        for (var c = 0u; c < params.classes; c++) {
+            let p = exp(class_logit(feature, c) - best) / sum;
+            let g = scale * (p - select(0.0, 1.0, c == r.label));
+            logits_gradient[ray * params.classes + c] = g;
+#for j in 0..4
+            df[${j}] += g * decoders[${HEAD_VEC4+j}u + c * 4u];
+#end
+        }
+#for j in 0..4
+        ray_state[state + ${STATE_FEATURE+j}u] = feature[${j}];
+        ray_state[state + ${STATE_FEATURE_DELTA+j}u] = df[${j}];
+#end
+#for q in 0..8
+        {
+            let t = vec4f(dot4(${561+q*16}u, df), dot4(${565+q*16}u, df), dot4(${569+q*16}u, df), dot4(${573+q*16}u, df));
+            let d = select(vec4f(0.0), t, hs[${q}] > vec4f(0.0));
+            ray_state[state + ${STATE_SEMANTIC_HIDDEN+q}u] = hs[${q}];
+            ray_state[state + ${STATE_SEMANTIC_HIDDEN_DELTA+q}u] = d;
+            hs[${q}] = d;
+        }
+#end
+#for q in 0..8
+        {
+            var t = vec4f(0.0);
+#for c in 0..4
+            t[${c}] = dot8(${297+(q*4+c)*8}u, hs);
+#end
+            ray_state[state + ${STATE_SEMANTIC_GRADIENT+q}u] = t;
+        }
+#end
+    }
+    let out = ray * 3u;
+    let depth_error = select(0.0, abs(geometry.x - r.depth), r.depth > 0.0);
+    ray_out[out] = vec4f(rgb, geometry.x);
+    ray_out[out + 1u] = vec4f(geometry.y, bitcast<f32>(best_class), loss_color, loss_depth);
+    ray_out[out + 2u] = vec4f(loss_semantic, 0.0, depth_error, 0.0);
+}

@@ -1,0 +1,51 @@
+// The field at single points: signed distance, colour, class. One invocation a point.
+#import shared/dispatch.wgsl
+#import shared/params.wgsl
+#import shared/planes.wgsl
+
+@group(0) @binding(1) var<storage, read> points: array<vec4f>;
+@group(0) @binding(2) var<storage, read> planes_geometry: array<vec4f>;
+@group(0) @binding(3) var<storage, read> planes_appearance: array<vec4f>;
+@group(0) @binding(4) var<storage, read> planes_semantic: array<vec4f>;
+@group(0) @binding(5) var<storage, read> decoders: array<vec4f>;
+// Distance [truncations]; for params.flags & FLAG_MAP then 2 vec4 a point: distance, class (bits), 0, 0 | rgb, 0.
+@group(0) @binding(6) var<storage, read_write> values: array<f32>;
+
+#import shared/geometry.wgsl
+#import shared/appearance.wgsl
+#import shared/semantic.wgsl
+#import shared/surface.wgsl
+
+@compute @workgroup_size(WORKGROUP_SIZE)
+fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    load_geometry_decoder(lane);
+    load_surface_decoders(lane);
+    let i = linear_invocation(wid, groups, lane);
+    if (i >= params.rays) {
+        return;
+    }
+    let p = points[i].xyz;
+    let distance = geometry_decoder(lookup_geometry(p)).distance;
+    if ((params.flags & FLAG_MAP) == 0u) {
+        values[i] = distance;
+        return;
+    }
+    let rgb = color_output(color_hidden(lookup_appearance(p)));
+    var best_class = 255u;
+    if (params.classes > 0u) {
+        let feature = semantic_output(semantic_hidden(lookup_semantic(p)));
+        var best = -1e30;
+        for (var c = 0u; c < params.classes; c++) {
+            let logit = class_logit(feature, c);
+            if (logit > best) {
+                best = logit;
+                best_class = c;
+            }
+        }
+    }
+    values[i * 8u] = distance;
+    values[i * 8u + 1u] = bitcast<f32>(best_class);
+    values[i * 8u + 4u] = rgb.x;
+    values[i * 8u + 5u] = rgb.y;
+    values[i * 8u + 6u] = rgb.z;
+}

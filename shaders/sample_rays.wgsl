@@ -1,0 +1,71 @@
+// Draws the pixels of a batch and makes their world rays. One invocation a ray.
+#import shared/dispatch.wgsl
+#import shared/params.wgsl
+#import shared/random.wgsl
+#import shared/rays.wgsl
+
+// 12 floats a slot: rotation row-major, translation. world_from_camera.
+@group(0) @binding(1) var<storage, read> poses: array<f32>;
+// Slot of each window frame; the top bit fixes its pose.
+@group(0) @binding(2) var<storage, read> window: array<u32>;
+// Per slot width * height words: red, green, blue, compact class.
+@group(0) @binding(3) var<storage, read> color_images: array<u32>;
+// Per slot ceil(width * height / 2) words: two depths each.
+@group(0) @binding(4) var<storage, read> depth_images: array<u32>;
+@group(0) @binding(5) var<storage, read_write> rays: array<Ray>;
+
+fn raw_depth(slot: u32, pixel: u32) -> u32 {
+    let stride = (params.width * params.height + 1u) / 2u;
+    return (depth_images[slot * stride + pixel / 2u] >> (16u * (pixel & 1u))) & 0xffffu;
+}
+
+@compute @workgroup_size(WORKGROUP_SIZE)
+fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let ray = linear_invocation(wid, groups, lane);
+    if (ray >= params.rays) {
+        return;
+    }
+    let pixels = params.width * params.height;
+    let frame = ray / params.rays_per_frame;
+    let slot = window[frame] & 0x7fffffffu;
+    var pixel = (params.first + ray) % pixels;
+    var raw = 0u;
+    if ((params.flags & FLAG_DENSE) == 0u) {
+        // A pixel without depth gets one second draw: rays with depth teach more.
+        pixel = random_u32(params.seed, params.iteration, ray, 0u) % pixels;
+        raw = raw_depth(slot, pixel);
+        if (raw == 0u) {
+            pixel = random_u32(params.seed, params.iteration, ray, 1u) % pixels;
+            raw = raw_depth(slot, pixel);
+        }
+    } else if ((params.flags & FLAG_GUIDED) != 0u) {
+        raw = raw_depth(slot, pixel);
+    }
+    let d = vec3f((f32(pixel % params.width) - params.cx) / params.fx, (f32(pixel / params.width) - params.cy) / params.fy, 1.0);
+    let b = slot * 12u;
+    var out: Ray;
+    out.direction = vec3f(
+        poses[b] * d.x + poses[b + 1u] * d.y + poses[b + 2u] * d.z,
+        poses[b + 3u] * d.x + poses[b + 4u] * d.y + poses[b + 5u] * d.z,
+        poses[b + 6u] * d.x + poses[b + 7u] * d.y + poses[b + 8u] * d.z,
+    );
+    out.origin = vec3f(poses[b + 9u], poses[b + 10u], poses[b + 11u]);
+    out.depth = f32(raw) * params.depth_unit;
+    out.frame = frame;
+    // A rendered view may have another size than the stored images: it has no colours to compare with.
+    var c = 0xff000000u;
+    if ((params.flags & (FLAG_DENSE | FLAG_GUIDED)) != FLAG_DENSE) {
+        c = color_images[slot * pixels + pixel];
+    }
+    out.color = vec3f(f32(c & 255u), f32((c >> 8u) & 255u), f32((c >> 16u) & 255u)) / 255.0;
+    out.label = c >> 24u;
+    // A surface outside the map teaches nothing: mark the ray (top bit of frame) so that no loss uses it.
+    let hit = out.origin + out.direction * out.depth;
+    let outside = any(hit < params.box_min.xyz) || any(hit > params.box_max.xyz);
+    if (outside && (params.flags & FLAG_DENSE) == 0u) {
+        out.frame = out.frame | 0x80000000u;
+        out.depth = 0.0;
+        out.label = 255u;
+    }
+    rays[ray] = out;
+}
