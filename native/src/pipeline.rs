@@ -27,7 +27,11 @@ use mte_slam_core::{
     slam::{FrameReport, PoseEstimate, Slam, TrackingStatus, View},
 };
 use pollster::block_on;
-use std::{path::PathBuf, time::Instant};
+use std::{
+    path::{Path, PathBuf},
+    sync::OnceLock,
+    time::Instant,
+};
 
 /// Everything that a run needs.
 pub struct Job<'a> {
@@ -69,6 +73,7 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
     ));
     let mut slam = block_on(Slam::new(chosen.engine, effective.config.clone(), &info))
         .context("the map cannot be set up")?;
+    slam.set_clock(clock_s);
 
     let timings = process(&mut slam, sequence.as_mut(), screen)?;
     let estimates = slam.trajectory();
@@ -110,8 +115,7 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
         }
     }
 
-    let mut saved = slam.checkpoint().context("the map cannot be saved")?;
-    checkpoint::describe(&mut saved, &info)?;
+    let saved = block_on(slam.checkpoint()).context("the map cannot be saved")?;
     folder.write("checkpoint.safetensors", &checkpoint::write(&saved))?;
     drop(saved);
     folder.write("timings.csv", write_csv(&timings).as_bytes())?;
@@ -125,6 +129,23 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
     folder.publish()?;
     screen.result(&format!("{}\nwritten to {}\n", metrics.table(), path.display()), &json);
     Ok(())
+}
+
+/// Seconds since the first call, for the reports of the core (which has no clock of its own).
+fn clock_s() -> f64 {
+    static START: OnceLock<Instant> = OnceLock::new();
+    START.get_or_init(Instant::now).elapsed().as_secs_f64()
+}
+
+/// Restore the map of an output folder's checkpoint.
+pub fn restore(out: &Path, engine: &EngineArgs, screen: Screen) -> Result<Slam> {
+    let path = out.join("checkpoint.safetensors");
+    let saved = checkpoint::read_file(&path)?;
+    let chosen = engine::start(engine)?;
+    let slam = block_on(Slam::restore(chosen.engine, &saved))
+        .with_context(|| format!("{}: the map cannot be restored", path.display()))?;
+    screen.note(&format!("{}: {}", slam.info().name, chosen.note));
+    Ok(slam)
 }
 
 /// Feed every frame; what each cost.

@@ -1,35 +1,31 @@
 //! `mte-slam render`.
 use crate::{
     args::RenderArgs,
-    engine,
-    output::{checkpoint, folder::replace_file, trajectory::read_tum},
-    pipeline::write_view,
+    output::folder::replace_file,
+    pipeline::{restore, write_view},
     screen::Screen,
 };
 use anyhow::{Context, Result, bail};
-use mte_slam_core::slam::Slam;
 use pollster::block_on;
 
 /// Render a frame's pose from a checkpoint.
 pub fn run(args: &RenderArgs, screen: Screen) -> Result<()> {
-    let path = args.out.join("trajectory.txt");
-    let name = path.display().to_string();
-    let text = std::fs::read_to_string(&path)
-        .with_context(|| format!("{name}: cannot be read; expected the output folder of a run"))?;
-    let poses = read_tum(&name, &text)?;
-    let Some((_, pose)) = poses.get(args.frame) else {
-        bail!("--frame: found {}, expected 0 to {} ({name})", args.frame, poses.len() as i64 - 1);
+    let mut slam = restore(&args.out, &args.engine, screen)?;
+    let estimates = slam.trajectory();
+    let Some(estimate) = estimates.get(args.frame) else {
+        bail!(
+            "--frame: found {}, expected one of the {} frames of {}, counted from 0",
+            args.frame,
+            estimates.len(),
+            args.out.display()
+        );
     };
-    let saved = checkpoint::read_file(&args.out.join("checkpoint.safetensors"))?;
-    let described = checkpoint::described(&saved)?;
-    let chosen = engine::start(&args.engine)?;
-    screen.note(&format!("{}: {}", described.name, chosen.note));
-    let mut slam = block_on(Slam::restore(chosen.engine, &saved))
-        .with_context(|| format!("{}: the map cannot be restored", args.out.display()))?;
-    let view = block_on(slam.render(pose, &described.camera))
+    let camera = slam.info().camera;
+    let classes = slam.info().classes.clone();
+    let view = block_on(slam.render(&estimate.world_from_camera, &camera))
         .with_context(|| format!("rendering frame {}", args.frame))?;
     let mut names = Vec::new();
-    write_view(&view, &described.classes, &mut |kind, bytes| {
+    write_view(&view, &classes, &mut |kind, bytes| {
         let path = args.out.join(format!("renders/{:06}.{kind}.png", args.frame));
         names.push(path.display().to_string());
         replace_file(&path, bytes)

@@ -2,13 +2,7 @@
 //! tensors). Written here rather than by a library because its header order must not depend on a
 //! hash seed: the same run twice gives the same bytes.
 use anyhow::{Context, Result, bail};
-use mte_slam_core::{
-    camera::Camera,
-    classes::ClassTable,
-    frame::SequenceInfo,
-    slam::{Checkpoint, Dtype, Tensor},
-};
-use serde::{Deserialize, Serialize};
+use mte_slam_core::slam::{Checkpoint, Dtype, Tensor};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
@@ -48,36 +42,6 @@ pub fn write(checkpoint: &Checkpoint) -> Vec<u8> {
         bytes.extend_from_slice(&tensor.bytes);
     }
     bytes
-}
-
-/// What the map's file says of the sequence beside the map itself.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Described {
-    /// Name of the sequence.
-    pub name: String,
-    /// Camera of the images.
-    pub camera: Camera,
-    /// Classes, in the order of their compact index.
-    pub classes: ClassTable,
-}
-
-const DESCRIPTION: &str = "sequence";
-
-/// Note the sequence in the checkpoint, so that `mesh` and `render` need nothing else.
-pub fn describe(checkpoint: &mut Checkpoint, info: &SequenceInfo) -> Result<()> {
-    let described =
-        Described { name: info.name.clone(), camera: info.camera, classes: info.classes.clone() };
-    checkpoint.metadata.insert(DESCRIPTION.to_owned(), serde_json::to_string(&described)?);
-    Ok(())
-}
-
-/// What [`describe`] noted.
-pub fn described(checkpoint: &Checkpoint) -> Result<Described> {
-    let text = checkpoint.metadata.get(DESCRIPTION).with_context(|| {
-        format!("checkpoint: found no `{DESCRIPTION}` in its metadata; run it again")
-    })?;
-    serde_json::from_str(text)
-        .with_context(|| format!("checkpoint: metadata `{DESCRIPTION}` is not understood"))
 }
 
 /// Read `OUT/checkpoint.safetensors`.

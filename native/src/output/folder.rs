@@ -90,11 +90,6 @@ impl OutputFolder {
         Ok(folder)
     }
 
-    /// The folder.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
     fn staging(&self) -> PathBuf {
         self.path.join(STAGING)
     }
