@@ -76,7 +76,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
                 var js = array<f32, 6>(gs.x, gs.y, gs.z, ms.x, ms.y, ms.z);
                 var jc = array<f32, 6>(gc.x, gc.y, gc.z, mc.x, mc.y, mc.z);
 #for a in 0..6
-#for b in ${a}..6
+#for b in a..6
                 sums[${(a*(13-a)/2+b-a)/4}][${(a*(13-a)/2+b-a)%4}] = ws * js[${a}] * js[${b}] + wc * jc[${a}] * jc[${b}];
 #end
                 sums[${(21+a)/4}][${(21+a)%4}] = ws * js[${a}] * rs + wc * jc[${a}] * rc;
