@@ -9,6 +9,8 @@ extern crate alloc;
 pub mod camera;
 pub mod classes;
 pub mod config;
+#[cfg(feature = "dataset")]
+pub mod dataset;
 pub mod device;
 pub mod engine;
 pub mod field;

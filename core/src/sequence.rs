@@ -79,4 +79,8 @@ pub trait Sequence {
     fn truth(&self, index: usize) -> Option<Pose>;
     /// Time stamp of frame `index` \[s\] (the frame number where there are no stamps).
     fn time_s(&self, index: usize) -> f64;
+    /// What was assumed, skipped or masked while reading so far, for people; one sentence each.
+    fn warnings(&self) -> Vec<String> {
+        Vec::new()
+    }
 }

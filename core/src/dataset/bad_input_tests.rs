@@ -1,0 +1,375 @@
+//! Every kind of bad input gives an error that names the file, what was found and what was
+//! expected; and good input is read back as it was written.
+use super::{test_support::*, *};
+use crate::classes::UNLABELLED;
+
+fn assert_has(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "{part:?} is not in: {text}");
+    }
+}
+
+/// The error after a change of the tiny recording.
+fn after(change: impl FnOnce(&mut MemorySource)) -> String {
+    let mut m = replica(3);
+    change(&mut m);
+    error_of(&m, OpenOptions::default())
+}
+
+#[test]
+fn what_is_written_is_read_back() {
+    let mut s = opened(&replica(3)).unwrap();
+    let (want, got) = (info(), s.info().clone());
+    assert_eq!((got.camera, got.frames, got.layout), (want.camera, 3, "replica"));
+    assert_eq!((got.classes, got.bounds), (want.classes, want.bounds));
+    assert!((got.depth_unit_m - want.depth_unit_m).abs() < 1e-18);
+    assert_eq!(s.warnings(), Vec::<String>::new());
+    for i in 0..3 {
+        let (want, got) = (frame(i), s.frame(i).unwrap());
+        assert_eq!((got.color, got.depth, got.labels), (want.color, want.depth, want.labels));
+        let error = want.truth.unwrap().compose(&got.truth.unwrap().inverse());
+        assert!(error.translation.length() < 1e-12 && error.angle_rad() < 1e-7);
+        assert_eq!(s.truth(i), got.truth);
+    }
+    assert!(s.frame(3).is_err());
+}
+
+#[test]
+fn jpeg_colour_is_close() {
+    let mut m = MemorySource::new("tiny");
+    let sink = |name: &str, bytes: &[u8]| {
+        m.insert(name, bytes);
+        Ok(())
+    };
+    let mut flat = frame(0);
+    flat.color.fill([200, 90, 30]);
+    let mut writer = ReplicaWriter::new(&info(), ColorFormat::Jpeg, sink);
+    writer.write(&flat).unwrap();
+    writer.finish().unwrap();
+    let got = opened(&m).unwrap().frame(0).unwrap();
+    assert!(got.color.iter().all(|c| (0..3).all(|k| c[k].abs_diff([200, 90, 30][k]) < 4)));
+}
+
+#[test]
+fn the_writer_refuses_what_does_not_fit() {
+    let refuse = |_: &str, _: &[u8]| Err(std::io::Error::other("disk full"));
+    let mut w = ReplicaWriter::new(&info(), ColorFormat::Png, refuse);
+    assert_has(&w.write(&frame(0)).unwrap_err().to_string(), &["frame000000.png", "disk full"]);
+    let mut w = ReplicaWriter::new(&info(), ColorFormat::Png, |_: &str, _: &[u8]| Ok(()));
+    let mut bad = frame(1);
+    bad.depth.pop();
+    assert_has(&w.write(&bad).unwrap_err().to_string(), &["frame 1: depth pixels", "383", "384"]);
+    let mut bad = frame(1);
+    bad.labels.as_mut().unwrap()[0] = 77;
+    assert_has(&w.write(&bad).unwrap_err().to_string(), &["class index: found 77"]);
+}
+
+#[test]
+fn all_layouts_deliver_the_same_in_numeric_order() {
+    for layout in Layout::ALL {
+        // Twelve frames: lexical order would put 10 before 2.
+        let mut s = opened(&renamed(12, layout)).unwrap();
+        assert_eq!((s.info().layout, s.info().frames), (layout.name(), 12), "{layout}");
+        for i in [0, 2, 10, 11] {
+            let (want, got) = (frame(i), s.frame(i).unwrap());
+            assert_eq!(got.color, want.color, "{layout} {i}");
+            assert_eq!(got.labels, want.labels, "{layout} {i}");
+            assert_eq!(got.number, i as u64);
+            assert_eq!(got.depth[..200], want.depth[..200], "{layout} {i}");
+            let off = got.truth.unwrap().translation - want.truth.unwrap().translation;
+            assert!(off.length() < 1e-9, "{layout} {i}");
+        }
+        if layout == Layout::Tum {
+            assert!((s.time_s(3) - 100.1).abs() < 1e-9);
+        }
+    }
+}
+
+#[test]
+fn start_stride_and_frames_select() {
+    let pick = |start, stride, frames| {
+        let options = OpenOptions { start, stride, frames, ..Default::default() };
+        open(Box::new(replica(7)), options)
+            .map(|s| (0..s.info().frames).map(|i| s.time_s(i) as usize).collect::<Vec<_>>())
+    };
+    assert_eq!(pick(1, 3, None).unwrap(), [1, 4]);
+    assert_eq!(pick(2, 2, Some(2)).unwrap(), [2, 4]);
+    assert_eq!(pick(6, 1, Some(9)).unwrap(), [6]);
+    assert_has(&pick(7, 1, None).unwrap_err().to_string(), &["start", "found 7", "less than 7"]);
+    assert!(pick(0, 0, None).is_err() && pick(0, 1, Some(0)).is_err());
+}
+
+#[test]
+fn scale_makes_all_images_smaller_alike() {
+    let options = OpenOptions { scale: 0.5, ..Default::default() };
+    let mut s = open(Box::new(replica(1)), options).unwrap();
+    assert_eq!(s.info().camera, info().camera.downscaled(2));
+    let (full, half) = (frame(0), s.frame(0).unwrap());
+    let (at, w) = (5 * (W as usize / 2) + 3, W as usize);
+    assert_eq!(half.depth[at], full.depth[10 * w + 6]);
+    assert_eq!(half.labels.unwrap()[at], full.labels.unwrap()[10 * w + 6]);
+    let mean: u32 = [0, 1, w, w + 1].iter().map(|o| u32::from(full.color[10 * w + 6 + o][1])).sum();
+    assert_eq!(u32::from(half.color[at][1]), (mean + 2) / 4);
+    for (scale, part) in [(0.0, "(0, 1]"), (1.5, "(0, 1]"), (f64::NAN, "(0, 1]"), (0.1, "8x8")] {
+        assert_has(&error_of(&replica(1), OpenOptions { scale, ..Default::default() }), &[part]);
+    }
+}
+
+#[test]
+fn colour_of_another_size_is_fitted_to_depth() {
+    let mut m = replica(1);
+    let mut big = Vec::new();
+    let image = image::RgbImage::from_pixel(W * 2, H * 2, image::Rgb([10, 20, 30]));
+    image.write_to(&mut std::io::Cursor::new(&mut big), image::ImageFormat::Png).unwrap();
+    m.insert("results/frame000000.png", big);
+    let got = opened(&m).unwrap().frame(0).unwrap();
+    assert_eq!(got.color, vec![[10, 20, 30]; (W * H) as usize]);
+}
+
+#[test]
+fn missing_files_are_named() {
+    assert_has(
+        &after(|m| drop(m.remove("results/depth000001.png"))),
+        &["results/depth", "1.png", "results/frame000001.png has no depth image"],
+    );
+    let mut m = renamed(3, Layout::Tum);
+    m.remove("rgb/1.png");
+    assert_has(&error_of(&m, OpenOptions::default()), &["rgb/1.png", "no such file", "frame 1"]);
+    assert_has(&error_of(&MemorySource::new("void"), OpenOptions::default()), &["void", "empty"]);
+    // Poses are optional: own recordings have none.
+    let mut m = replica(2);
+    m.remove("traj.txt");
+    let s = opened(&m).unwrap();
+    assert_eq!(s.truth(0), None);
+    assert_has(&s.warnings().join("; "), &["traj.txt", "no ground-truth poses"]);
+    let e = after(|m| drop(m.remove("cam_params.json")));
+    assert_has(&e, &["24x16", "1200x680", "no cam_params.json"]);
+}
+
+#[test]
+fn broken_images_are_named() {
+    let cut = |m: &mut MemorySource, file: &str| {
+        let bytes = m.get(file).unwrap();
+        let half = bytes[..bytes.len() / 2].to_vec();
+        m.insert(file, half);
+    };
+    for file in [
+        "results/frame000001.png",
+        "results/depth000001.png",
+        "semantic_class/semantic_class_000001.png",
+    ] {
+        assert_has(&after(|m| cut(m, file)), &[file, "frame 1", "PNG"]);
+        assert_has(&after(|m| m.insert(file, "hello")), &[file, "frame 1", "5 bytes"]);
+        assert_has(&after(|m| m.insert(file, "")), &[file, "empty file"]);
+    }
+    // Depth of 8 bits, and colour in its place.
+    let e = after(|m| {
+        let grey = m.get("results/frame000000.png").unwrap().to_vec();
+        m.insert("results/depth000000.png", grey);
+    });
+    assert_has(&e, &["depth000000.png", "8-bit RGB", "16-bit grey"]);
+}
+
+fn png_of(w: u32, h: u32, value: u16) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let image = image::ImageBuffer::<image::Luma<u16>, _>::from_pixel(w, h, image::Luma([value]));
+    image.write_to(&mut std::io::Cursor::new(&mut bytes), image::ImageFormat::Png).unwrap();
+    bytes
+}
+
+#[test]
+fn sizes_that_change_are_named() {
+    for (file, what) in [
+        ("results/frame000002.png", "colour image size"),
+        ("results/depth000002.png", "depth image size"),
+        ("semantic_class/semantic_class_000002.png", "label image size"),
+    ] {
+        let e = after(|m| m.insert(file, png_of(12, 8, 0)));
+        assert_has(&e, &[file, "frame 2", what, "12x8", "24x16"]);
+    }
+    let e = after(|m| m.insert("results/frame000000.png", png_of(16, 24, 0)));
+    assert_has(&e, &["frame000000.png", "16x24", "proportions"]);
+}
+
+#[test]
+fn poses_too_few_or_not_finite() {
+    let with = |change: fn(Vec<&str>) -> Vec<String>| {
+        move |m: &mut MemorySource| {
+            let text = String::from_utf8(m.get("traj.txt").unwrap().to_vec()).unwrap();
+            let lines = change(text.lines().collect());
+            m.insert("traj.txt", lines.join("\n"));
+        }
+    };
+    let e = after(with(|l| l[..2].iter().map(|s| (*s).into()).collect()));
+    assert_has(&e, &["traj.txt", "2 lines", "3 lines"]);
+    let e = after(with(|l| l.iter().map(|s| s.replacen('e', "x", 1)).collect()));
+    assert_has(&e, &["traj.txt", "frame 0", "number"]);
+    let e = after(with(|l| vec![l[0].into(), l[1].into(), "1 2 3".into()]));
+    assert_has(&e, &["traj.txt", "frame 2", "3 numbers", "16 numbers"]);
+    let e = after(with(|l| vec![l[0].into(), l[1].into(), ["2"; 16].join(" ")]));
+    assert_has(&e, &["traj.txt", "frame 2", "not a rotation"]);
+    let e = after(|m| m.insert("traj.txt", b"1 0 0 \xff".to_vec()));
+    assert_has(&e, &["traj.txt", "no UTF-8 at byte 6"]);
+
+    for word in ["-inf", "NaN", "inf"] {
+        let mut m = replica(3);
+        let text = String::from_utf8(m.get("traj.txt").unwrap().to_vec()).unwrap();
+        let mut lines: Vec<String> = text.lines().map(String::from).collect();
+        lines[1] = [word; 16].join(" ");
+        m.insert("traj.txt", lines.join("\n"));
+        let mut s = opened(&m).unwrap();
+        assert_eq!((s.truth(1), s.frame(1).unwrap().truth), (None, None));
+        assert!(s.truth(2).is_some());
+        assert_has(&s.warnings().join("; "), &["1 frame without a ground-truth pose"]);
+    }
+}
+
+#[test]
+fn a_subset_of_the_images_takes_its_poses_by_number() {
+    let mut m = replica(5);
+    for kind in ["results/frame", "results/depth"] {
+        for i in [0, 1, 3] {
+            m.remove(&format!("{kind}{i:06}.png"));
+        }
+    }
+    let s = opened(&m).unwrap();
+    let off = s.truth(1).unwrap().translation - frame(4).truth.unwrap().translation;
+    assert!(s.info().frames == 2 && off.length() < 1e-9);
+}
+
+#[test]
+fn depth_without_a_measurement_is_fine() {
+    let mut m = replica(1);
+    m.insert("results/depth000000.png", png_of(W, H, 0));
+    assert!(opened(&m).unwrap().frame(0).unwrap().depth.iter().all(|&d| d == 0));
+    let mut m = renamed(1, Layout::SevenScenes);
+    m.insert("frame-000000.depth.png", png_of(W, H, 65535));
+    assert!(opened(&m).unwrap().frame(0).unwrap().depth.iter().all(|&d| d == 0));
+}
+
+#[test]
+fn labels_from_elsewhere_and_without_a_list() {
+    let mut own = MemorySource::new("guesses");
+    own.insert("a/1.png", png_of(W, H, 7));
+    own.insert("a/2.png", png_of(W, H, 9));
+    let with = |own: &MemorySource, recording: &MemorySource| {
+        let labels = LabelSource::Folder(Box::new(own.clone()));
+        open(Box::new(recording.clone()), OpenOptions { labels, ..Default::default() })
+    };
+    // The recording's list knows 7 and not 9.
+    let mut s = with(&own, &replica(3)).unwrap();
+    assert_has(&s.warnings().join(";"), &["1 frame without a label image"]);
+    assert_eq!(s.frame(0).unwrap().labels, None);
+    assert_eq!(s.frame(1).unwrap().labels.unwrap()[0], 1);
+    assert_eq!(s.frame(2).unwrap().labels.unwrap()[0], UNLABELLED);
+    assert_has(&s.warnings().join(";"), &["384 label pixels", "not in the class list: 9"]);
+
+    let mut listless = replica(3);
+    listless.remove("classes.json");
+    let s = with(&own, &listless).unwrap();
+    let classes = &s.info().classes.classes;
+    assert_eq!((classes[0].name.as_str(), classes[1].name.as_str()), ("class 7", "class 9"));
+    assert_ne!(classes[0].color, classes[1].color);
+    own.insert("a/0.png", png_of(W, H, 255));
+    assert_eq!(with(&own, &listless).unwrap().info().classes.len(), 2);
+
+    own.insert("a/other_0.png", png_of(W, H, 7));
+    let e = with(&own, &replica(3)).map(drop).unwrap_err().to_string();
+    assert_has(&e, &["guesses/a", "<number>.png", "other_<number>.png"]);
+    let e = with(&MemorySource::new("none"), &replica(3)).map(drop).unwrap_err().to_string();
+    assert_has(&e, &["none", "0 files"]);
+
+    let options = OpenOptions { labels: LabelSource::None, ..Default::default() };
+    let mut s = open(Box::new(replica(1)), options).unwrap();
+    assert!(s.info().classes.is_empty() && s.frame(0).unwrap().labels.is_none());
+}
+
+#[test]
+fn too_many_classes_are_refused() {
+    let list = |n: u32| {
+        let one = |i| format!("\"{}\": {{\"name\": \"c{i}\"}}", i + 1);
+        format!("{{{}}}", (0..n).map(one).collect::<Vec<_>>().join(","))
+    };
+    assert_has(&after(|m| m.insert("classes.json", list(256))), &["256", "at most 255"]);
+    let mut m = replica(1);
+    m.insert("classes.json", list(400));
+    let options = OpenOptions { only_present_classes: true, ..Default::default() };
+    let s = open(Box::new(m), options).unwrap();
+    let ids: Vec<u16> = s.info().classes.classes.iter().map(|c| c.raw_id).collect();
+    assert_eq!(ids, [1, 7, 300]); // 1 is what the writer took for void, and is listed here
+}
+
+#[test]
+fn bounds_that_are_none_are_refused() {
+    for text in ["{}", r#"{"bound": [[1, 0], [0, 1], [0, 1]]}"#, r#"{"bound": [[0, 1], [0]]}"#] {
+        assert_has(&after(|m| m.insert("bound.json", text)), &["bound.json", "ascending"]);
+    }
+}
+
+#[test]
+fn distorted_tum_images_are_straightened() {
+    let mut m = renamed(1, Layout::Tum);
+    m.remove("cam_params.json");
+    m.insert("camera.txt", "50 50 31.5 23.5  0.05 0 0 0 0");
+    m.insert("rgb/0.png", png_of(64, 48, 0x8000));
+    m.insert("depth/0.png", png_of(64, 48, 321));
+    m.insert("semantic_class/semantic_class_0.png", png_of(64, 48, 7));
+    let mut s = opened(&m).unwrap();
+    assert_has(&s.warnings().join(";"), &["distortion", "48x32", "64x48"]);
+    let (c, f) = (s.info().camera, s.frame(0).unwrap());
+    assert_eq!((c.width, c.height, c.cx, c.cy, c.fx), (48, 32, 23.5, 15.5, 50.0));
+    assert_eq!((f.color, f.depth), (vec![[128; 3]; c.pixels()], vec![321; c.pixels()]));
+    assert_eq!(f.labels.unwrap(), vec![1; c.pixels()]);
+    m.insert("camera.txt", "50 50 31.5 23.5  5 5 0 0 0");
+    assert_has(&error_of(&m, OpenOptions::default()), &["camera.txt", "lens distortion"]);
+}
+
+/// A small generator, so that the same damage is done each time.
+struct Pcg(u64);
+
+impl Pcg {
+    fn below(&mut self, n: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        ((self.0 >> 33) as usize) % n.max(1)
+    }
+}
+
+#[test]
+fn random_damage_never_panics() {
+    let mut rng = Pcg(2024);
+    let (mut good, mut bad) = (0, 0);
+    for layout in Layout::ALL {
+        let whole = renamed(2, layout);
+        let names: Vec<String> = whole.names().map(String::from).collect();
+        for _ in 0..250 {
+            let mut m = whole.clone();
+            for _ in 0..=rng.below(2) {
+                let name = &names[rng.below(names.len())];
+                let mut bytes = m.remove(name).unwrap_or_default();
+                match rng.below(6) {
+                    0 => continue,
+                    1 => bytes.truncate(rng.below(bytes.len())),
+                    2 => bytes.insert(rng.below(bytes.len()), rng.below(256) as u8),
+                    3 => bytes.extend_from_slice(b"-9e999 \xfe {"),
+                    _ => {
+                        for _ in 0..=rng.below(4) {
+                            let at = rng.below(bytes.len());
+                            if let Some(b) = bytes.get_mut(at) {
+                                *b ^= 1 << rng.below(8);
+                            }
+                        }
+                    }
+                }
+                m.insert(name.clone(), bytes);
+            }
+            let scale = [1.0, 0.5, 0.7][rng.below(3)];
+            let read = open(Box::new(m), OpenOptions { scale, ..Default::default() })
+                .and_then(|mut s| (0..s.info().frames).try_for_each(|i| s.frame(i).map(drop)));
+            match read {
+                Ok(()) => good += 1,
+                Err(_) => bad += 1,
+            }
+        }
+    }
+    assert!(good > 50 && bad > 500, "{good} read, {bad} refused");
+}

@@ -1,0 +1,42 @@
+//! Recordings on disk, in an archive or in a browser, by the layout of their files.
+//!
+//! | layout | colour | depth | poses | labels |
+//! | --- | --- | --- | --- | --- |
+//! | `replica` | `results/frame000000.jpg` | `results/depth000000.png`, 1/6553.5 m | `traj.txt` | `semantic_class/` |
+//! | `replica-vmap` | `rgb/rgb_0.png` | `depth/depth_0.png`, mm | `traj.txt`, `traj_w_c.txt` | `semantic_class/` |
+//! | `tum` | `rgb.txt` | `depth.txt`, 1/5000 m | `groundtruth.txt` | `semantic_class/` |
+//! | `7scenes` | `frame-000000.color.png` | `frame-000000.depth.png`, mm | `frame-000000.pose.txt` | `semantic_class/` |
+//!
+//! Files that any layout may hold beside its own:
+//! - the camera: `cam_params.json` (`{"camera": {w, h, fx, fy, cx, cy, scale}}`, `scale` in depth
+//!   units per metre, `k1 k2 p1 p2 k3` if there is distortion; also one folder up),
+//!   `camera-intrinsics.txt` (a 3x3 matrix) or `camera.txt` (`fx fy cx cy [k1 k2 p1 p2 k3]`);
+//! - `bound.json`: `{"bound": [[x0, x1], [y0, y1], [z0, z1]]}` in metres;
+//! - `classes.json`: `{"7": {"name": "bed", "color": [86, 117, 191]}}`, colour optional.
+//!
+//! Frames are in numeric order, and the world frame is the data set's own.
+mod decode;
+mod entries;
+mod folder;
+mod intrinsics;
+mod labels;
+mod layout;
+mod memory;
+mod reader;
+mod resize;
+mod tum;
+mod write;
+
+pub use decode::MAX_SIDE;
+pub use labels::class_color;
+pub use layout::Layout;
+pub use memory::MemorySource;
+pub use reader::{LabelSource, OpenOptions, open};
+pub use write::{ColorFormat, ReplicaWriter, WriteError};
+
+#[cfg(test)]
+mod bad_input_tests;
+#[cfg(test)]
+mod data_tests;
+#[cfg(test)]
+mod test_support;

@@ -1,0 +1,289 @@
+//! Opening a recording, and decoding its frames.
+use super::{
+    decode::{self, Origin, Size},
+    entries::{self, Entry},
+    folder::{Folder, invalid, plural},
+    intrinsics::Rectifier,
+    labels::{Labels, Wanted},
+    layout::Layout,
+    resize::Resize,
+};
+use crate::{
+    classes::ClassTable,
+    frame::{Frame, SequenceInfo},
+    pose::Pose,
+    sequence::{Sequence, SequenceError, Source},
+};
+
+/// Smallest side of a scaled image \[pixels\].
+const MIN_SIDE: u32 = 8;
+
+/// Where labels come from.
+#[derive(Default)]
+pub enum LabelSource {
+    /// No labels.
+    None,
+    /// The recording's own `semantic_class/` folder, if it has one.
+    #[default]
+    Dataset,
+    /// PNGs of ids made by anyone, named like the colour or depth images or by frame number. Its
+    /// own `classes.json` counts before the recording's.
+    Folder(Box<dyn Source>),
+}
+
+/// What of a recording is read, and how.
+pub struct OpenOptions {
+    /// The layout, or `None` to recognise it by its files.
+    pub layout: Option<Layout>,
+    /// First frame, counted from 0 in the recording's order.
+    pub start: usize,
+    /// Every how manieth frame is used, at least 1.
+    pub stride: usize,
+    /// At most so many frames are used.
+    pub frames: Option<usize>,
+    /// Images are made smaller by this factor, in (0, 1]: colour by averaging, depth and labels
+    /// by nearest pixel.
+    pub scale: f64,
+    /// Where labels come from.
+    pub labels: LabelSource,
+    /// The raw label id that means "no label". By default the class named `void`, `unlabelled`
+    /// or `unlabeled` in `classes.json`, or else 255 unless that is a listed class.
+    pub unlabelled_raw_id: Option<u16>,
+    /// Drop listed classes that no label image of the frames in use shows (all of them are then
+    /// decoded once at opening).
+    pub only_present_classes: bool,
+}
+
+impl Default for OpenOptions {
+    fn default() -> Self {
+        Self {
+            layout: None,
+            start: 0,
+            stride: 1,
+            frames: None,
+            scale: 1.0,
+            labels: LabelSource::default(),
+            unlabelled_raw_id: None,
+            only_present_classes: false,
+        }
+    }
+}
+
+/// Opens a recording: lists the files, reads poses, camera and classes, and checks that every
+/// frame in use has its files. Images are decoded frame by frame later.
+///
+/// # Errors
+/// Any [`SequenceError`]: an unknown layout, missing files, a file that is not what it should be
+/// (with what was found and what was expected), or options that make no sense.
+pub fn open(
+    source: Box<dyn Source>,
+    options: OpenOptions,
+) -> Result<Box<dyn Sequence>, SequenceError> {
+    let mut folder = Folder::new(source)?;
+    let wrong = |field: &str, found: String, expected: &str| {
+        Err(invalid(&folder.name(), None, field, found, expected))
+    };
+    if options.stride == 0 {
+        return wrong("stride", "0".into(), "at least 1");
+    }
+    if options.frames == Some(0) {
+        return wrong("number of frames", "0".into(), "at least 1");
+    }
+    if !(options.scale > 0.0 && options.scale <= 1.0) {
+        return wrong("scale", options.scale.to_string(), "a number in (0, 1]");
+    }
+    let layout = Layout::detect(&mut folder, options.layout)?;
+    let mut all = entries::read(&folder, layout)?;
+    let mut warnings = std::mem::take(&mut all.warnings);
+
+    let there = all.frames.len();
+    let wanted = options.frames.unwrap_or(usize::MAX);
+    let mut frames: Vec<Entry> =
+        all.frames.into_iter().skip(options.start).step_by(options.stride).take(wanted).collect();
+    let Some(first) = frames.first() else {
+        let found = options.start.to_string();
+        let expected = format!("less than {there}, the number of frames");
+        return Err(invalid(&folder.name(), None, "start", found, expected));
+    };
+    for frame in &frames {
+        for file in [&frame.color, &frame.depth] {
+            if !folder.has(file) {
+                let number = frame.number;
+                let reason = format!("no such file in {} (frame {number})", folder.name());
+                return Err(SequenceError::Read { file: file.clone(), reason });
+            }
+        }
+    }
+
+    let depth_origin = Origin { file: &first.depth, frame: first.number, what: "depth image" };
+    let depth_size = decode::size_of(&folder.read(&first.depth)?, depth_origin)?;
+    let color_origin = Origin { file: &first.color, frame: first.number, what: "colour image" };
+    let color_size = decode::size_of(&folder.read(&first.color)?, color_origin)?;
+    let mut camera = all.intrinsics.camera(&first.depth, depth_size)?;
+    check_aspect(&first.color, first.number, color_size, depth_size)?;
+
+    let color_to_depth = Resize::to_size(color_size, depth_size);
+    let rectifier = if all.intrinsics.distortion == [0.0; 5] {
+        None
+    } else {
+        let rectifier = Rectifier::new(&all.intrinsics.from, &camera, &all.intrinsics.distortion)?;
+        let flat = rectifier.camera();
+        warnings.push(format!(
+            "lens distortion taken out; {}x{} pixels of {}x{} are left",
+            flat.width, flat.height, camera.width, camera.height
+        ));
+        camera = flat;
+        Some(rectifier)
+    };
+    let resize = Resize::by_scale((camera.width, camera.height), options.scale);
+    let (width, height) = resize.size();
+    if options.scale < 1.0 && (width < MIN_SIDE || height < MIN_SIDE) {
+        let found = format!("{}, which leaves {width}x{height} pixels", options.scale);
+        let expected = format!("at least {MIN_SIDE}x{MIN_SIDE}");
+        return Err(invalid(&folder.name(), None, "scale", found, expected));
+    }
+    camera = resize.camera(&camera);
+
+    let classes_wanted =
+        Wanted { void: options.unlabelled_raw_id, only_present: options.only_present_classes };
+    let labels = match options.labels {
+        LabelSource::None => None,
+        LabelSource::Dataset => {
+            Labels::open(&folder, None, &mut frames, depth_size, classes_wanted)?
+        }
+        LabelSource::Folder(source) => {
+            let own = Some(Folder::new(source)?);
+            Labels::open(&folder, own, &mut frames, depth_size, classes_wanted)?
+        }
+    };
+    let bare = frames.iter().filter(|f| f.label.is_none()).count();
+    if labels.is_some() && bare > 0 {
+        warnings.push(format!("{} without a label image", plural(bare, "frame")));
+    }
+
+    let name = folder.name();
+    let last = name.trim_end_matches(['/', '\\']).rsplit(['/', '\\']).next().unwrap_or_default();
+    let info = SequenceInfo {
+        name: last.into(),
+        layout: layout.name(),
+        camera,
+        depth_unit_m: all.depth_unit_m,
+        frames: frames.len(),
+        classes: labels.as_ref().map_or_else(ClassTable::default, |l| l.table.clone()),
+        bounds: all.bounds,
+    };
+    Ok(Box::new(Reader {
+        folder,
+        info,
+        frames,
+        depth_size,
+        color_size,
+        invalid_depth: all.invalid_depth,
+        color_to_depth,
+        rectifier,
+        resize,
+        labels,
+        warnings,
+    }))
+}
+
+/// Colour is stretched to the size of depth, which is right only when both show the same.
+fn check_aspect(file: &str, frame: u64, color: Size, depth: Size) -> Result<(), SequenceError> {
+    let aspect = |s: Size| f64::from(s.0) / f64::from(s.1);
+    let ratio = aspect(color) / aspect(depth);
+    if (ratio - 1.0).abs() > 0.03 {
+        return Err(invalid(
+            file,
+            Some(frame),
+            "colour image size",
+            format!("{}x{}", color.0, color.1),
+            format!("the proportions of the depth image, {}x{}", depth.0, depth.1),
+        ));
+    }
+    Ok(())
+}
+
+struct Reader {
+    folder: Folder,
+    info: SequenceInfo,
+    frames: Vec<Entry>,
+    depth_size: Size,
+    color_size: Size,
+    invalid_depth: Option<u16>,
+    color_to_depth: Resize,
+    rectifier: Option<Rectifier>,
+    resize: Resize,
+    labels: Option<Labels>,
+    warnings: Vec<String>,
+}
+
+impl Reader {
+    /// Depth or labels, from the size on disk to the size of the camera.
+    fn fit_nearest<T: Copy>(&self, mut image: Vec<T>) -> Vec<T> {
+        if let Some(rectifier) = &self.rectifier {
+            image = rectifier.nearest(&image);
+        }
+        if self.resize.is_identity() { image } else { self.resize.nearest(&image) }
+    }
+
+    fn fit_color(&self, mut image: Vec<[u8; 3]>) -> Vec<[u8; 3]> {
+        if !self.color_to_depth.is_identity() {
+            image = self.color_to_depth.average(&image);
+        }
+        if let Some(rectifier) = &self.rectifier {
+            image = rectifier.bilinear(&image);
+        }
+        if self.resize.is_identity() { image } else { self.resize.average(&image) }
+    }
+}
+
+impl Sequence for Reader {
+    fn info(&self) -> &SequenceInfo {
+        &self.info
+    }
+
+    fn frame(&mut self, index: usize) -> Result<Frame, SequenceError> {
+        let entry = self
+            .frames
+            .get(index)
+            .ok_or(SequenceError::OutOfRange { index, frames: self.frames.len() })?
+            .clone();
+        let frame = entry.number;
+        let origin = Origin { file: &entry.color, frame, what: "colour image" };
+        let bytes = self.folder.read(&entry.color)?;
+        let color = self.fit_color(decode::color(&bytes, origin, Some(self.color_size))?);
+
+        let origin = Origin { file: &entry.depth, frame, what: "depth image" };
+        let bytes = self.folder.read(&entry.depth)?;
+        let mut depth = decode::depth(&bytes, origin, Some(self.depth_size))?;
+        if let Some(marker) = self.invalid_depth {
+            for d in depth.iter_mut().filter(|d| **d == marker) {
+                *d = 0;
+            }
+        }
+        let depth = self.fit_nearest(depth);
+
+        let labels = match (&mut self.labels, &entry.label) {
+            (Some(labels), Some(file)) => {
+                Some(labels.read(&self.folder, file, frame, self.depth_size)?)
+            }
+            _ => None,
+        };
+        let labels = labels.map(|l| self.fit_nearest(l));
+        let (number, time_s, truth) = (entry.number, entry.time_s, entry.truth);
+        Ok(Frame { index, number, time_s, color, depth, labels, truth })
+    }
+
+    fn truth(&self, index: usize) -> Option<Pose> {
+        self.frames.get(index)?.truth
+    }
+
+    fn time_s(&self, index: usize) -> f64 {
+        self.frames.get(index).map_or(f64::NAN, |f| f.time_s)
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let unknown = self.labels.as_ref().and_then(Labels::warning);
+        self.warnings.iter().cloned().chain(unknown).collect()
+    }
+}
