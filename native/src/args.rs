@@ -15,7 +15,7 @@ use std::path::PathBuf;
         classes where there are labels), pictures rendered from the map and metrics come out.\n\n\
         Start with the built-in sequence, which needs no data:\n\n    \
         mte-slam demo\n\n\
-        then with your own recording (Replica, ScanNet, TUM RGB-D or 7-Scenes layout):\n\n    \
+        then with your own recording (Replica, TUM RGB-D or 7-Scenes layout):\n\n    \
         mte-slam run path/to/recording --out out/mine\n    \
         mte-slam mesh out/mine --resolution 0.01",
     after_help = "Exit codes: 0 done, 1 something failed while working, 2 the command line or \
@@ -48,7 +48,7 @@ pub enum Command {
     /// Run SLAM on a recording and write trajectory, metrics, mesh and pictures
     #[command(
         long_about = "Run SLAM on a recording. The layout is recognised by the files there: Replica \
-        (NICE-SLAM or vMAP render), ScanNet, TUM RGB-D, 7-Scenes.\n\n\
+        (NICE-SLAM or vMAP render), TUM RGB-D, 7-Scenes.\n\n\
         The output folder receives:\n    \
         trajectory.txt       time stamp, position [m] and quaternion of world_from_camera (TUM format)\n    \
         trajectory_gt.txt    the same of the ground truth, where known\n    \
@@ -210,7 +210,7 @@ pub struct RunArgs {
 /// Which part of a recording, and how it is read.
 #[derive(Clone, Debug, Args)]
 pub struct SelectionArgs {
-    /// Layout of the files, instead of recognising it: replica, vmap, scannet, scannet-sens, tum, 7scenes.
+    /// Layout of the files, instead of recognising it: replica, replica-vmap, tum, 7scenes.
     #[arg(long, value_name = "LAYOUT", help_heading = "Recording")]
     pub layout: Option<String>,
     /// Take at most N frames [default: all].

@@ -1,7 +1,11 @@
 //! Opening what is read.
-use crate::{args::SelectionArgs, evaluation::MeshTruth};
-use anyhow::{Result, bail};
+use crate::{
+    args::SelectionArgs, errors::usage, evaluation::MeshTruth, screen::Screen, source::FolderSource,
+};
+use anyhow::Result;
 use mte_slam_core::{
+    classes::UNLABELLED,
+    dataset::{self, LabelSource, Layout, OpenOptions},
     mesh::Mesh,
     sequence::Sequence,
     synth::{SyntheticMesh, SyntheticOptions, SyntheticSequence},
@@ -9,14 +13,41 @@ use mte_slam_core::{
 use std::path::Path;
 
 /// Open a recording.
-pub fn open(path: &Path, _selection: &SelectionArgs) -> Result<Box<dyn Sequence>> {
-    if !path.is_dir() {
-        bail!("{}: the recording: found no folder of that name, expected one", path.display());
+pub fn open(path: &Path, selection: &SelectionArgs, screen: Screen) -> Result<Box<dyn Sequence>> {
+    let layout = selection.layout.as_deref().map(layout_named).transpose()?;
+    let source = FolderSource::open(path)?;
+    if let [first, ..] = source.skipped_links() {
+        let (name, n) = (path.display(), source.skipped_links().len());
+        screen.note(&format!(
+            "note: {name}: {n} links that lead out of it, such as {first}, are skipped"
+        ));
     }
-    Ok(Box::new(SyntheticSequence::new(SyntheticOptions::default())))
+    let labels = match selection.labels.as_str() {
+        "none" => LabelSource::None,
+        "dataset" => LabelSource::Dataset,
+        folder => LabelSource::Folder(Box::new(FolderSource::open(Path::new(folder))?)),
+    };
+    let options = OpenOptions {
+        layout,
+        start: selection.start,
+        stride: selection.stride,
+        frames: selection.frames,
+        scale: selection.scale,
+        labels,
+        ..OpenOptions::default()
+    };
+    Ok(dataset::open(Box::new(source), options)?)
 }
 
-/// The built-in sequence and its true mesh.
+fn layout_named(name: &str) -> Result<Layout> {
+    if let Some(layout) = Layout::ALL.into_iter().find(|l| l.name() == name) {
+        return Ok(layout);
+    }
+    let names = Layout::ALL.map(Layout::name).join(", ");
+    usage!("--layout: found `{name}`, expected one of {names}");
+}
+
+/// The built-in sequence.
 pub fn built_in(frames: usize, width: u32) -> SyntheticSequence {
     let height = width / 4 * 3;
     SyntheticSequence::new(SyntheticOptions { frames, width, height, ..Default::default() })
@@ -25,7 +56,7 @@ pub fn built_in(frames: usize, width: u32) -> SyntheticSequence {
 /// The built-in sequence's mesh as the core's mesh type; a vertex takes the class of its faces.
 pub fn true_mesh(synthetic: SyntheticMesh) -> MeshTruth {
     let SyntheticMesh { positions, triangles, face_class, colors } = synthetic;
-    let mut classes = vec![mte_slam_core::classes::UNLABELLED; positions.len()];
+    let mut classes = vec![UNLABELLED; positions.len()];
     for (triangle, class) in triangles.iter().zip(face_class) {
         for &i in triangle {
             classes[i as usize] = class;

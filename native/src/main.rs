@@ -13,6 +13,7 @@ mod pipeline;
 mod progress;
 mod record;
 mod screen;
+mod source;
 
 use args::{Cli, Command};
 use clap::Parser;

@@ -71,6 +71,9 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
         info.classes.len(),
         chosen.note
     ));
+    for warning in sequence.warnings() {
+        screen.note(&format!("note: {warning}"));
+    }
     let mut slam = block_on(Slam::new(chosen.engine, effective.config.clone(), &info))
         .context("the map cannot be set up")?;
     slam.set_clock(clock_s);
@@ -122,6 +125,7 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
     record.config_hash = configuration::hash(&effective.config)?;
     folder.write("config.toml", config_file(&effective.config, &record)?.as_bytes())?;
 
+    metrics.warnings = sequence.warnings();
     metrics.time = Some(time_figures(&timings, start));
     metrics.memory = Some(memory_figures(slam.memory_bytes() as u64));
     let json = metrics.to_json()?;

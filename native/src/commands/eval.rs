@@ -42,7 +42,7 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
         scale: record.scale,
         labels: args.labels.clone(),
     };
-    let mut sequence = input::open(&args.dataset, &selection)?;
+    let mut sequence = input::open(&args.dataset, &selection, screen)?;
     let info = sequence.info().clone();
     let truth_mesh = MeshTruth::find(args.mesh.as_deref(), &args.dataset)?;
     let record = RunRecord { labels: args.labels.clone(), ..record };
@@ -67,11 +67,16 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
             let bytes = std::fs::read(&path).with_context(|| format!("{name}: cannot be read"))?;
             let mesh = read_ply(&bytes).with_context(|| format!("{name}: not a mesh"))?;
             screen.note("comparing the mesh with the true one");
-            let report =
-                evaluation::mesh(mesh, truth, sequence.as_mut(), args.cull.protocol(), args.icp)?;
-            metrics.mesh = Some(report);
+            let protocol = args.cull.protocol();
+            match evaluation::mesh(mesh, truth, sequence.as_mut(), protocol, args.icp) {
+                Ok(report) => metrics.mesh = Some(report),
+                Err(reason) => {
+                    metrics.absent.insert("mesh", format!("{reason:#}"));
+                }
+            }
         }
     }
+    metrics.warnings = sequence.warnings();
     let json = metrics.to_json()?;
     let path = out.join("eval.json");
     replace_file(&path, json.as_bytes())?;

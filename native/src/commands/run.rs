@@ -16,7 +16,7 @@ pub fn run(args: &RunArgs, screen: Screen) -> Result<()> {
     // Everything that can be wrong with the command line comes before anything slow.
     let named = args.config.preset.is_some();
     let early = configuration::effective(&args.config, "replica")?;
-    let sequence = input::open(&args.dataset, &args.selection)?;
+    let sequence = input::open(&args.dataset, &args.selection, screen)?;
     let info = sequence.info();
     let default_preset = preset_of_layout(info.layout);
     let effective = if named || default_preset == early.preset {
@@ -54,8 +54,9 @@ pub fn run(args: &RunArgs, screen: Screen) -> Result<()> {
 /// The preset that suits a layout.
 fn preset_of_layout(layout: &str) -> &'static str {
     match layout {
-        l if l.starts_with("scannet") => "scannet",
-        "tum" | "7scenes" => "tum",
+        // 7-Scenes is what ScanNet is: a real room at 30 Hz by a structured-light sensor.
+        "7scenes" => "scannet",
+        "tum" => "tum",
         _ => "replica",
     }
 }

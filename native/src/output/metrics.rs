@@ -21,6 +21,8 @@ pub struct Metrics {
     pub engine: Option<EngineRecord>,
     /// Indices of the frames whose pose could not be tracked.
     pub lost_frames: Vec<usize>,
+    /// What was assumed, skipped or masked while reading.
+    pub warnings: Vec<String>,
     /// Trajectory error over all frames with a true pose, lost ones included.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trajectory: Option<AteReport>,
@@ -214,6 +216,9 @@ impl Metrics {
         for (name, value, protocol) in rows {
             let line = format!("{name:name_width$}  {value:value_width$}  {protocol}");
             let _ = writeln!(text, "{}", line.trim_end());
+        }
+        for warning in &self.warnings {
+            let _ = writeln!(text, "note: {warning}");
         }
         for (section, reason) in &self.absent {
             let _ = writeln!(text, "no {section}: {reason}");
