@@ -2,7 +2,7 @@
 use crate::{
     args::SelectionArgs, errors::usage, evaluation::MeshTruth, screen::Screen, source::FolderSource,
 };
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 use mte_slam_core::{
     classes::UNLABELLED,
     dataset::{self, LabelSource, Layout, OpenOptions},
@@ -36,7 +36,11 @@ pub fn open(path: &Path, selection: &SelectionArgs, screen: Screen) -> Result<Bo
         labels,
         ..OpenOptions::default()
     };
-    Ok(dataset::open(Box::new(source), options)?)
+    dataset::open(Box::new(source), options).map_err(|e| {
+        let (message, name) = (e.to_string(), path.display().to_string());
+        // Errors about one file name it below the folder only.
+        if message.contains(&name) { anyhow!(message) } else { anyhow!("{name}: {message}") }
+    })
 }
 
 fn layout_named(name: &str) -> Result<Layout> {

@@ -78,7 +78,7 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
         .context("the map cannot be set up")?;
     slam.set_clock(clock_s);
 
-    let timings = process(&mut slam, sequence.as_mut(), screen)?;
+    let timings = process(&mut slam, sequence.as_mut(), &record.dataset, screen)?;
     let estimates = slam.trajectory();
     let truth: Vec<_> = estimates.iter().map(|e| sequence.truth(e.frame)).collect();
 
@@ -153,12 +153,17 @@ pub fn restore(out: &Path, engine: &EngineArgs, screen: Screen) -> Result<Slam> 
 }
 
 /// Feed every frame; what each cost.
-fn process(slam: &mut Slam, sequence: &mut dyn Sequence, screen: Screen) -> Result<Vec<Timing>> {
+fn process(
+    slam: &mut Slam,
+    sequence: &mut dyn Sequence,
+    recording: &str,
+    screen: Screen,
+) -> Result<Vec<Timing>> {
     let frames = sequence.info().frames;
     let mut progress = screen.progress("tracking and mapping", frames);
     let mut timings = Vec::with_capacity(frames);
     for index in 0..frames {
-        let frame = sequence.frame(index)?;
+        let frame = sequence.frame(index).with_context(|| recording.to_owned())?;
         let begin = Instant::now();
         let report = block_on(slam.process(&frame))
             .with_context(|| format!("frame {} (index {index})", frame.number))?;
@@ -280,7 +285,7 @@ fn render_views(
     let chosen: Vec<_> = estimates.iter().step_by(output.render_every).collect();
     let mut progress = screen.progress("rendering", chosen.len());
     for (i, estimate) in chosen.iter().enumerate() {
-        let frame = sequence.frame(estimate.frame)?;
+        let frame = sequence.frame(estimate.frame).with_context(|| info.name.clone())?;
         let view = block_on(slam.render(&estimate.world_from_camera, &info.camera))
             .with_context(|| format!("rendering frame {}", estimate.frame))?;
         let stem = format!("renders/{:06}", estimate.frame);
