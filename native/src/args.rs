@@ -372,7 +372,7 @@ fn picture_width(text: &str) -> Result<u32, String> {
 
 fn positive_metres(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(m) if m.is_finite() && m >= 0.001 && m <= 1.0 => Ok(m),
+        Ok(m) if (0.001..=1.0).contains(&m) => Ok(m),
         _ => Err("expected metres from 0.001 to 1".to_owned()),
     }
 }

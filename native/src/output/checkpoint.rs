@@ -32,7 +32,7 @@ pub fn write(checkpoint: &Checkpoint) -> Vec<u8> {
         );
     }
     let mut text = Value::Object(header).to_string().into_bytes();
-    while text.len() % 8 != 0 {
+    while !text.len().is_multiple_of(8) {
         text.push(b' ');
     }
     let mut bytes = Vec::with_capacity(8 + text.len() + end);
