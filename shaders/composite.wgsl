@@ -29,6 +29,8 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     var transmittance = 1.0;
     var depth = 0.0;
     var opacity = 0.0;
+    var first = params.samples;
+    var last = 0u;
     var z0 = depths[base];
     var phi0 = phi(distances[base]);
     for (var i = 1u; i < params.samples; i++) {
@@ -42,6 +44,8 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
         depth += w * z;
         opacity += w;
         if (w > params.min_weight) {
+            first = min(first, i - 1u);
+            last = i;
             let local = r.origin + z * r.direction - params.box_min.xyz;
             let g0 = local * params.surface_inv_cell.x;
             let g1 = local * params.surface_inv_cell.y;
@@ -79,5 +83,6 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     ray_state[state + ${STATE_APPEARANCE+q}u] = appearance[${q}];
     ray_state[state + ${STATE_SEMANTIC+q}u] = semantic[${q}];
 #end
-    ray_state[state + ${STATE_DEPTH}u] = vec4f(depth, opacity, 0.0, 0.0);
+    // The range of intervals that count, so that later passes need not search for them.
+    ray_state[state + ${STATE_DEPTH}u] = vec4f(depth, opacity, 0.0, f32(min(first, last) * 256u + last));
 }

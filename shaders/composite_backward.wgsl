@@ -118,7 +118,8 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
                 ds += 2.0 * c * x * params.truncation * inv_rays;
             }
         }
-        distance_gradient[base + i] = select(ds, 0.0, skip);
+        let idle = abs(ds) * (1.0 - s * s) * f32(params.rays) < params.min_gradient;
+        distance_gradient[base + i] = select(ds, 0.0, skip || idle);
     }
     out2.y = loss;
     ray_out[ray * 3u + 2u] = out2;

@@ -67,7 +67,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
         loss_depth = e * e;
         ddepth = 2.0 * e * params.weight_depth * inv_rays;
     }
-    ray_state[state + ${STATE_DEPTH}u] = vec4f(geometry.xy, ddepth, 0.0);
+    ray_state[state + ${STATE_DEPTH}u] = vec4f(geometry.xy, ddepth, geometry.w);
 
     // Semantics: cross-entropy at the class head; the gradient stops at the interval weights.
     var loss_semantic = 0.0;

@@ -20,10 +20,12 @@ fn add(cell: u32, quad: u32, v: vec4f) {
     }
     let q = vec4<i32>(round(limited));
     let i = cell * 16u + quad * 4u;
-    if (q.x != 0) { atomicAdd(&gradient[i], q.x); }
-    if (q.y != 0) { atomicAdd(&gradient[i + 1u], q.y); }
-    if (q.z != 0) { atomicAdd(&gradient[i + 2u], q.z); }
-    if (q.w != 0) { atomicAdd(&gradient[i + 3u], q.w); }
+    if (any(q != vec4<i32>(0))) {
+        atomicAdd(&gradient[i], q.x);
+        atomicAdd(&gradient[i + 1u], q.y);
+        atomicAdd(&gradient[i + 2u], q.z);
+        atomicAdd(&gradient[i + 3u], q.w);
+    }
 }
 
 @compute @workgroup_size(WORKGROUP_SIZE)
@@ -32,12 +34,12 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     if (job >= params.rays * 24u) {
         return;
     }
-    // Rays innermost: neighbouring lanes run the same plane and level.
-    let ray = job % params.rays;
-    let part = job / params.rays;
-    let quad = part % 4u;
-    let plane = (part / 4u) % 3u;
-    let level = part / 12u;
+    // Quads innermost: they share every branch, and their atomics lie side by side.
+    let quad = job % 4u;
+    let ray = (job / 4u) % params.rays;
+    let part = job / (4u * params.rays);
+    let plane = part % 3u;
+    let level = part / 3u;
     let inv = params.geometry_inv_cell[level];
     let grid = select(params.geometry_coarse, params.geometry_fine, level == 1u);
     let base = ray * params.samples;

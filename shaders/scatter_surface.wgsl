@@ -1,6 +1,6 @@
 // Adds feature gradients into the appearance and semantic planes, fixed point. All samples of a ray share one
 // gradient (features are composited before decoding), so per cell only four scalars are summed.
-// One invocation a (ray, modality, level, plane).
+// One invocation a (ray, modality, level, plane, channel quad).
 #import shared/dispatch.wgsl
 #import shared/params.wgsl
 #import shared/rays.wgsl
@@ -14,40 +14,38 @@
 @group(0) @binding(6) var<storage, read_write> gradient_semantic: array<atomic<i32>>;
 @group(0) @binding(7) var<storage, read_write> status: array<atomic<u32>>;
 
-fn add(modality: u32, cell: u32, w: f32, state: u32, scale: f32) {
-    if (w == 0.0) {
+fn add(modality: u32, cell: u32, quad: u32, v: vec4f) {
+    let limited = clamp(v, vec4f(-params.contribution_limit), vec4f(params.contribution_limit));
+    if (any(limited != v)) {
+        atomicOr(&status[0], 1u);
+    }
+    let q = vec4<i32>(round(limited));
+    let i = cell * 16u + quad * 4u;
+    if (all(q == vec4<i32>(0))) {
         return;
     }
-    for (var quad = 0u; quad < 4u; quad++) {
-        let scaled = ray_state[state + quad] * (w * scale);
-        let limited = clamp(scaled, vec4f(-params.contribution_limit), vec4f(params.contribution_limit));
-        if (any(limited != scaled)) {
-            atomicOr(&status[0], 1u);
-        }
-        let q = vec4<i32>(round(limited));
-        let i = cell * 16u + quad * 4u;
-        if (modality == 0u) {
-            if (q.x != 0) { atomicAdd(&gradient_appearance[i], q.x); }
-            if (q.y != 0) { atomicAdd(&gradient_appearance[i + 1u], q.y); }
-            if (q.z != 0) { atomicAdd(&gradient_appearance[i + 2u], q.z); }
-            if (q.w != 0) { atomicAdd(&gradient_appearance[i + 3u], q.w); }
-        } else {
-            if (q.x != 0) { atomicAdd(&gradient_semantic[i], q.x); }
-            if (q.y != 0) { atomicAdd(&gradient_semantic[i + 1u], q.y); }
-            if (q.z != 0) { atomicAdd(&gradient_semantic[i + 2u], q.z); }
-            if (q.w != 0) { atomicAdd(&gradient_semantic[i + 3u], q.w); }
-        }
+    if (modality == 0u) {
+        atomicAdd(&gradient_appearance[i], q.x);
+        atomicAdd(&gradient_appearance[i + 1u], q.y);
+        atomicAdd(&gradient_appearance[i + 2u], q.z);
+        atomicAdd(&gradient_appearance[i + 3u], q.w);
+    } else {
+        atomicAdd(&gradient_semantic[i], q.x);
+        atomicAdd(&gradient_semantic[i + 1u], q.y);
+        atomicAdd(&gradient_semantic[i + 2u], q.z);
+        atomicAdd(&gradient_semantic[i + 3u], q.w);
     }
 }
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let job = linear_invocation(wid, groups, lane);
-    if (job >= params.rays * 12u) {
+    if (job >= params.rays * 48u) {
         return;
     }
-    let ray = job % params.rays;
-    let part = job / params.rays;
+    let quad = job % 4u;
+    let ray = (job / 4u) % params.rays;
+    let part = job / (4u * params.rays);
     let plane = part % 3u;
     let level = (part / 3u) % 2u;
     let modality = part / 6u;
@@ -62,12 +60,14 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     let scale = select(params.scale_appearance, params.scale_semantic, modality == 1u);
     let state = ray * ${RAY_STATE_VEC4}u + level * 4u
         + select(${STATE_APPEARANCE_GRADIENT}u, ${STATE_SEMANTIC_GRADIENT}u, modality == 1u);
+    let g = ray_state[state + quad] * scale;
     let base = ray * params.samples;
     let origin = (rays[ray].origin - params.box_min.xyz) * inv;
     let direction = rays[ray].direction * inv;
     var held = vec4<u32>(0xffffffffu);
     var sum = vec4f(0.0);
-    for (var i = 0u; i + 1u < params.samples; i++) {
+    let range = u32(ray_state[ray * ${RAY_STATE_VEC4}u + ${STATE_DEPTH}u].w);
+    for (var i = range / 256u; i < range % 256u; i++) {
         let w = weights[base + i];
         if (w <= params.min_weight) {
             continue;
@@ -76,10 +76,10 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
         let c = plane_corners(plane, origin + z * direction, grid);
         if (c.cell.x != held.x) {
             if (held.x != 0xffffffffu) {
-                add(modality, held.x, sum.x, state, scale);
-                add(modality, held.y, sum.y, state, scale);
-                add(modality, held.z, sum.z, state, scale);
-                add(modality, held.w, sum.w, state, scale);
+                add(modality, held.x, quad, g * sum.x);
+                add(modality, held.y, quad, g * sum.y);
+                add(modality, held.z, quad, g * sum.z);
+                add(modality, held.w, quad, g * sum.w);
             }
             held = c.cell;
             sum = vec4f(0.0);
@@ -87,9 +87,9 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
         sum += c.weight * w;
     }
     if (held.x != 0xffffffffu) {
-        add(modality, held.x, sum.x, state, scale);
-        add(modality, held.y, sum.y, state, scale);
-        add(modality, held.z, sum.z, state, scale);
-        add(modality, held.w, sum.w, state, scale);
+        add(modality, held.x, quad, g * sum.x);
+        add(modality, held.y, quad, g * sum.y);
+        add(modality, held.z, quad, g * sum.z);
+        add(modality, held.w, quad, g * sum.w);
     }
 }

@@ -221,8 +221,14 @@ fn main() {
             if verbose {
                 let q = result.quality;
                 let e = recording.frames[i].2.inverse().compose(&result.world_from_camera);
+                let step = i.checked_sub(1).map_or(0.0, |j| {
+                    (recording.frames[i].2.translation - recording.frames[j].2.translation).length()
+                });
+                let own = i.checked_sub(1).map_or(0.0, |j| (online[i] - online[j]).length());
                 println!(
-                    "{i:4} err {:6.2} cm {:5.2} deg  inl {:.2} ovl {:.2} g {:.2} mm p {:.4} cond {:.1e} refs {} {} {}",
+                    "{i:4} step {:.2} {:.2} cm err {:6.2} cm {:5.2} deg  inl {:.2} ovl {:.2} g {:.2} mm p {:.4} cond {:.1e} refs {} {} {}",
+                    100.0 * step,
+                    100.0 * own,
                     100.0 * e.translation.length(),
                     e.angle_rad().to_degrees(),
                     q.inlier_ratio,

@@ -152,6 +152,9 @@ pub struct MappingConfig {
     pub rate_rotation_rad: f64,
     /// Only every n-th tile of samples trains the geometry decoder.
     pub decoder_stride: u32,
+    /// Samples whose gradient at the distance's pre-activation (times the rays) is smaller than
+    /// this are left alone.
+    pub min_gradient: f64,
 }
 
 /// Keyframes.
@@ -270,7 +273,8 @@ impl Default for MappingConfig {
             refine_poses: true,
             rate_translation_m: 1e-3,
             rate_rotation_rad: 1e-3,
-            decoder_stride: 4,
+            decoder_stride: 8,
+            min_gradient: 2e-4,
         }
     }
 }
@@ -413,6 +417,7 @@ impl Config {
         positive("mapping.rate_decoders", m.rate_decoders)?;
         not_negative("mapping.rate_translation_m", m.rate_translation_m)?;
         not_negative("mapping.rate_rotation_rad", m.rate_rotation_rad)?;
+        not_negative("mapping.min_gradient", m.min_gradient)?;
         count("mapping.decoder_stride", m.decoder_stride, 1024, "1 to 1024")?;
         count("keyframes.every", self.keyframes.every, u32::MAX, "at least 1")?;
         count("keyframes.budget_mib", self.keyframes.budget_mib, 1 << 16, "1 to 65536")?;

@@ -14,6 +14,7 @@ use crate::{
         geometry_backward::GEOMETRY_BACKWARD,
         geometry_forward::GEOMETRY_FORWARD,
         geometry_weights::GEOMETRY_WEIGHTS,
+        mask_rays::MASK_RAYS,
         pose_gradient::POSE_GRADIENT,
         pose_step::{POSE_STATE_FLOATS, POSE_STEP, PoseStepParams},
         query_points::QUERY_POINTS,
@@ -22,7 +23,7 @@ use crate::{
         sample_rays::SAMPLE_RAYS,
         scatter_geometry::SCATTER_GEOMETRY,
         scatter_surface::SCATTER_SURFACE,
-        shared::{FLAG_MAP, FLAG_POSE, RAY_WORDS},
+        shared::{FLAG_MAP, FLAG_MASK, FLAG_POSE, RAY_WORDS},
         weight_gradient::{WEIGHT_GRADIENT, WeightGradientParams},
     },
     layout::{
@@ -228,6 +229,7 @@ impl Device {
         base.min_weight = s.min_weight as f32;
         base.decoder_stride = config.mapping.decoder_stride;
         base.contribution_limit = 4_194_304.0;
+        base.min_gradient = config.mapping.min_gradient as f32;
         let t = &config.tracking;
         base.inv_sigma_distance = (1.0 / t.align_sigma_distance_m) as f32;
         base.inv_sigma_intensity = (1.0 / t.align_sigma_intensity) as f32;
@@ -394,6 +396,9 @@ impl Device {
             &[self.rays, decoders, self.ray_state, self.ray_out, self.logits_gradient],
             rays,
         );
+        if b.flags & FLAG_MASK != 0 {
+            r.dispatch(&MASK_RAYS, &p, &[self.ray_out], [1, 1, 1]);
+        }
     }
 
     /// Gradients down to the signed distances and, as the flags say, features and positions.
@@ -472,7 +477,7 @@ impl Device {
                     self.semantic.gradient,
                     self.status,
                 ],
-                rays * if self.classes > 0 { 12 } else { 6 },
+                rays * if self.classes > 0 { 48 } else { 24 },
             );
         }
     }
@@ -550,7 +555,7 @@ impl Device {
                     output_stride: if head { 16 } else { 1 },
                 },
                 &[self.ray_state, self.logits_gradient, self.decoder_partials],
-                (chunks * (inputs + 1) * outputs) as usize,
+                (chunks * (inputs + 1) * outputs.div_ceil(4)) as usize,
             );
         }
         r.dispatch_1d(

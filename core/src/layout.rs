@@ -39,7 +39,7 @@ pub const STATE_SEMANTIC_HIDDEN_DELTA: u32 = 49;
 pub const STATE_APPEARANCE_GRADIENT: u32 = 57;
 /// Gradient at the composited semantic features (8).
 pub const STATE_SEMANTIC_GRADIENT: u32 = 65;
-/// Depth \[m\], opacity, gradient at the depth (1).
+/// Depth \[m\], opacity, gradient at the depth, range of intervals that count: 256 first + end (1).
 pub const STATE_DEPTH: u32 = 73;
 /// Pose gradient: translation, rotation (2).
 pub const STATE_POSE: u32 = 74;
@@ -161,5 +161,13 @@ params! {
         robust_distance: f32,
         /// align_points: scale of the robust weight on intensities.
         robust_intensity: f32,
+        /// Gradients at a sample's pre-activation below this (times the rays) are dropped.
+        min_gradient: f32,
+        /// Unused.
+        spare0: f32,
+        /// Unused.
+        spare1: f32,
+        /// Unused.
+        spare2: f32,
     }
 }

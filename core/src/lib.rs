@@ -6,6 +6,7 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 extern crate alloc;
 
+pub mod bench;
 pub mod camera;
 pub mod classes;
 pub mod config;

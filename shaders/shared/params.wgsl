@@ -24,6 +24,8 @@ struct Params {
     scale_geometry: f32, scale_appearance: f32, scale_semantic: f32, contribution_limit: f32,
     // align_points: 1 / sigma of both residuals [1/m, 1], scales of the robust weights [m, 1].
     inv_sigma_distance: f32, inv_sigma_intensity: f32, robust_distance: f32, robust_intensity: f32,
+    // Gradients at a sample's pre-activation below this (per ray) are dropped: they move nothing but cost a scatter.
+    min_gradient: f32, spare0: f32, spare1: f32, spare2: f32,
 }
 @group(0) @binding(0) var<uniform> params: Params;
 

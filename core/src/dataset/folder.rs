@@ -36,16 +36,18 @@ impl Folder {
     /// Lists the source once.
     pub fn new(source: Box<dyn Source>) -> Result<Self, SequenceError> {
         let all: BTreeSet<String> = source.list()?.into_iter().collect();
-        Ok(Self { source, prefix: String::new(), names: all.clone(), all })
+        let names = all.iter().filter(|n| !n.starts_with("../")).cloned().collect();
+        Ok(Self { source, prefix: String::new(), all, names })
     }
 
     /// When every file lies in one sub-folder (an unpacked archive often looks so), go there.
     /// Returns whether it did.
     pub fn descend(&mut self) -> bool {
-        let Some(first) = self.names.iter().find(|n| !n.starts_with("../")) else { return false };
-        let Some((top, _)) = first.split_once('/') else { return false };
+        let Some((top, _)) = self.names.first().and_then(|n| n.split_once('/')) else {
+            return false;
+        };
         let top = format!("{top}/");
-        if !self.names.iter().all(|n| n.starts_with(&top) || n.starts_with("../")) {
+        if !self.names.iter().all(|n| n.starts_with(&top)) {
             return false;
         }
         self.names =
@@ -241,6 +243,7 @@ mod tests {
         let f = folder(&["../cam.json", "a"]);
         let above = f.here_or_above("cam.json").unwrap();
         assert_eq!(f.text(&above).unwrap(), "../cam.json");
-        assert!(f.read("../cam.json").is_ok() && f.read("../../etc/passwd").is_err());
+        assert_eq!(f.names().collect::<Vec<_>>(), ["a"]);
+        assert!(f.read("../cam.json").is_err() && f.read("../../etc/passwd").is_err());
     }
 }

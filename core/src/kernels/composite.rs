@@ -39,6 +39,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         let base = id * n;
         let (mut appearance, mut semantic) = ([0.0_f32; 32], [0.0_f32; 32]);
         let (mut transmittance, mut depth, mut opacity) = (1.0, 0.0, 0.0);
+        let (mut first, mut last) = (n, 0);
         let mut phi0 = phi(p.sharpness, distances[base]);
         for i in 1..n {
             let phi1 = phi(p.sharpness, distances[base + i]);
@@ -50,6 +51,8 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             depth += w * z;
             opacity += w;
             if w > p.min_weight {
+                first = first.min(i - 1);
+                last = i;
                 let at = ray.at(z);
                 let f = grid.lookup(appearance_planes, at);
                 for k in 0..32 {
@@ -70,7 +73,8 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             store_f32(&state[STATE_APPEARANCE as usize * 4 + k], appearance[k]);
             store_f32(&state[STATE_SEMANTIC as usize * 4 + k], semantic[k]);
         }
-        for (k, v) in [depth, opacity, 0.0, 0.0].into_iter().enumerate() {
+        let range = (first.min(last) * 256 + last) as f32;
+        for (k, v) in [depth, opacity, 0.0, range].into_iter().enumerate() {
             store_f32(&state[STATE_DEPTH as usize * 4 + k], v);
         }
     });

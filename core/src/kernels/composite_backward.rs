@@ -113,7 +113,9 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                     ds += 2.0 * c * x * p.truncation * inv_rays;
                 }
             }
-            store_f32(&gradient[id * n + i], if skip { 0.0 } else { ds });
+            let slope = ds.abs() * (1.0 - s[i] * s[i]) * (p.rays as f32);
+            let idle = slope < p.min_gradient;
+            store_f32(&gradient[id * n + i], if skip || idle { 0.0 } else { ds });
         }
         store_f32(&out[9], loss);
         for k in 0..3 {

@@ -54,7 +54,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         }
         let ray = Ray::load(rays, id);
         let state = &ray_state[id * RAY_STATE_FLOATS..(id + 1) * RAY_STATE_FLOATS];
-        let [depth, opacity, _, _] = get::<4>(state, STATE_DEPTH);
+        let [depth, opacity, _, range] = get::<4>(state, STATE_DEPTH);
 
         let hidden = color_hidden(surface, &get(state, STATE_APPEARANCE));
         let rgb = color_output(surface, &hidden);
@@ -79,7 +79,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             ddepth = 2.0 * e * p.weight_depth * inv_rays;
             depth_error = e.abs();
         }
-        put(state, STATE_DEPTH, &[depth, opacity, ddepth, 0.0]);
+        put(state, STATE_DEPTH, &[depth, opacity, ddepth, range]);
 
         let (mut loss_semantic, mut best_class) = (0.0, 255);
         if p.classes > 0 {

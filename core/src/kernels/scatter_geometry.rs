@@ -48,7 +48,7 @@ pub(super) fn add_quanta(
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let (rays, depths) = (dispatch.read_f32(0), dispatch.read_f32(1));
+    let (ray_words, depths) = (dispatch.read_f32(0), dispatch.read_f32(1));
     let (ds, features) = (dispatch.read_f32(2), dispatch.read_f32(3));
     let (gradient, status) = (dispatch.write(4), dispatch.write(5));
     let grid = Grid::geometry(&p);
@@ -57,9 +57,10 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         if job >= p.rays as usize * 24 {
             return;
         }
-        let (id, part) = (job % p.rays as usize, job / p.rays as usize);
-        let (quad, plane, level) = (part % 4, (part / 4) % 3, part / 12);
-        let ray = Ray::load(rays, id);
+        let rays = p.rays as usize;
+        let (quad, id, part) = (job % 4, (job / 4) % rays, job / (4 * rays));
+        let (plane, level) = (part % 3, part / 3);
+        let ray = Ray::load(ray_words, id);
         let mut held = [usize::MAX; 4];
         let mut sums = [[0.0_f32; 4]; 4];
         let flush = |held: [usize; 4], sums: &[[f32; 4]; 4]| {

@@ -4,7 +4,7 @@ use super::shared::{Grid, Ray, plane_corners};
 use super::CpuDispatch;
 use crate::{
     layout::{
-        FieldParams, RAY_STATE_FLOATS, STATE_APPEARANCE_GRADIENT, STATE_SEMANTIC_GRADIENT,
+        FieldParams, RAY_STATE_FLOATS, STATE_APPEARANCE_GRADIENT, STATE_DEPTH, STATE_SEMANTIC_GRADIENT,
     },
 };
 
@@ -28,19 +28,20 @@ kernel! {
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let (rays, depths) = (dispatch.read_f32(0), dispatch.read_f32(1));
+    let (ray_words, depths) = (dispatch.read_f32(0), dispatch.read_f32(1));
     let (weights, ray_state) = (dispatch.read_f32(2), dispatch.read_f32(3));
     let targets = [dispatch.write(4), dispatch.write(5)];
     let status = dispatch.write(6);
     let grid = Grid::surface(&p);
     let n = p.samples as usize;
     dispatch.for_each_invocation(|job| {
-        if job >= p.rays as usize * 12 {
+        if job >= p.rays as usize * 48 {
             return;
         }
-        let (id, part) = (job % p.rays as usize, job / p.rays as usize);
+        let rays = p.rays as usize;
+        let (quad, id, part) = (job % 4, (job / 4) % rays, job / (4 * rays));
         let (plane, level, modality) = (part % 3, (part / 3) % 2, part / 6);
-        let ray = Ray::load(rays, id);
+        let ray = Ray::load(ray_words, id);
         if ray.masked() || (modality == 1 && ray.label >= p.classes) {
             return;
         }
@@ -49,7 +50,8 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         } else {
             (p.scale_appearance, STATE_APPEARANCE_GRADIENT)
         };
-        let g = &ray_state[id * RAY_STATE_FLOATS + state as usize * 4 + level * 16..][..16];
+        let at = id * RAY_STATE_FLOATS + state as usize * 4 + level * 16 + quad * 4;
+        let g: [f32; 4] = core::array::from_fn(|k| ray_state[at + k] * scale);
         let mut held = [usize::MAX; 4];
         let mut sums = [0.0_f32; 4];
         let flush = |held: [usize; 4], sums: &[f32; 4]| {
@@ -57,14 +59,13 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                 return;
             }
             for c in 0..4 {
-                if sums[c] != 0.0 {
-                    let (first, scale) = (held[c] * 16, sums[c] * scale);
-                    let limit = p.contribution_limit;
-                    add_quanta(targets[modality], status, first, g, scale, limit);
-                }
+                let (first, values) = (held[c] * 16 + quad * 4, g.map(|x| x * sums[c]));
+                add_quanta(targets[modality], status, first, &values, 1.0, p.contribution_limit);
             }
         };
-        for i in 0..n - 1 {
+        let range =
+            ray_state[id * RAY_STATE_FLOATS + STATE_DEPTH as usize * 4 + 3] as usize;
+        for i in range / 256..range % 256 {
             let w = weights[id * n + i];
             if w <= p.min_weight {
                 continue;

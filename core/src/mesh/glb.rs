@@ -19,6 +19,7 @@ const INDICES: u32 = 34963;
 const U16: u32 = 5123;
 const U32: u32 = 5125;
 const F32: u32 = 5126;
+const UNLIT: &str = "KHR_materials_unlit";
 
 /// The mesh with POSITION, NORMAL and COLOR_0 as far as it has them, as one primitive.
 ///
@@ -26,7 +27,8 @@ const F32: u32 = 5126;
 /// A mesh that fails [`Mesh::check`] or has non-finite positions, or 4 GiB of data.
 pub fn write_glb(mesh: &Mesh) -> Result<Vec<u8>, MeshError> {
     let mut glb = Glb::with_vertices(mesh, true)?;
-    let material = r#"{"name":"vertex colours","doubleSided":true,"pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":1}}"#;
+    // The colours are as photographed, lighting included: viewers that can show them unlit.
+    let material = r#"{"name":"vertex colours","doubleSided":true,"pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":1},"extensions":{"KHR_materials_unlit":{}}}"#;
     let indices: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
     glb.add_primitive(&indices, material);
     glb.finish()
@@ -183,6 +185,9 @@ impl Glb {
         if self.primitives.is_empty() {
             json += r#","scene":0,"scenes":[{}]}"#;
         } else {
+            if self.materials.iter().any(|m| m.contains(UNLIT)) {
+                json += &format!(r#","extensionsUsed":["{UNLIT}"]"#);
+            }
             json += &format!(
                 r#","scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{}]}}],"materials":[{}],"accessors":[{}],"bufferViews":[{}],"buffers":[{{"byteLength":{}}}]}}"#,
                 self.primitives.join(","),

@@ -5,7 +5,7 @@ use super::{
     tables::{EDGE_BASE, triangle_tables},
 };
 use crate::frame::Bounds;
-use alloc::{collections::BTreeMap, format, vec::Vec};
+use alloc::{collections::BTreeMap, format, vec, vec::Vec};
 use glam::DVec3;
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
@@ -18,14 +18,16 @@ const MAX_CELLS: f64 = 1_048_576.0;
 pub struct Block {
     /// Position in the order of issue, from 0.
     pub sequence: u64,
-    /// Grid index of the first point.
+    /// World position of the whole grid's first point \[m\].
+    pub grid_origin: DVec3,
+    /// The whole grid's spacing \[m\].
+    pub grid_spacing_m: f64,
+    /// Grid index of the block's first point.
     pub first: [u32; 3],
-    /// World position of the first point \[m\].
-    pub origin: DVec3,
     /// Number of points along x, y, z (cells + 1; the last plane is the next block's first).
     pub dims: [u32; 3],
-    /// Distance between neighbouring points \[m\].
-    pub spacing_m: f64,
+    /// Grid steps between neighbouring points: 1, more for a [`Block::probe`].
+    pub stride: u32,
 }
 
 impl Block {
@@ -34,11 +36,25 @@ impl Block {
         self.dims.iter().map(|&d| d as usize).product()
     }
 
-    /// World position of point `i` \[m\]; x runs fastest, then y, then z.
+    /// World position of the first point \[m\].
+    pub fn origin(&self) -> DVec3 {
+        self.grid_origin + DVec3::from_array(self.first.map(f64::from)) * self.grid_spacing_m
+    }
+
+    /// Distance between neighbouring points \[m\].
+    pub fn spacing_m(&self) -> f64 {
+        self.grid_spacing_m * f64::from(self.stride)
+    }
+
+    /// World position of point `i` \[m\]; x runs fastest, then y, then z. A point that several
+    /// blocks share has the same bits in all of them.
     pub fn point(&self, i: usize) -> DVec3 {
         let (nx, ny) = (self.dims[0] as usize, self.dims[1] as usize);
-        let index = DVec3::new((i % nx) as f64, (i / nx % ny) as f64, (i / nx / ny) as f64);
-        self.origin + index * self.spacing_m
+        let local = [i % nx, i / nx % ny, i / nx / ny];
+        let at = core::array::from_fn(|a| {
+            f64::from(self.first[a]) + local[a] as f64 * f64::from(self.stride)
+        });
+        self.grid_origin + DVec3::from_array(at) * self.grid_spacing_m
     }
 
     /// A coarser grid over the same box, with at most every `step`-th point, to find out cheaply
@@ -46,7 +62,7 @@ impl Block {
     pub fn probe(&self, step: u32) -> Block {
         let step = step.max(1);
         let dims = self.dims.map(|d| d.saturating_sub(1).div_ceil(step) + 1);
-        Block { dims, spacing_m: self.spacing_m * f64::from(step), ..self.clone() }
+        Block { dims, stride: self.stride * step, ..self.clone() }
     }
 
     /// Whether a surface may be inside, from the signed distances \[m\] of this (coarse) grid's
@@ -54,7 +70,7 @@ impl Block {
     /// changes. True for a field whose gradient is at most 1; `slack_m` allows for a learned one.
     /// Unknown (non-finite) points count as surface unless all are unknown.
     pub fn may_hold_surface(&self, distances_m: &[f32], slack_m: f64) -> bool {
-        let reach = self.spacing_m * 3f64.sqrt() * 0.5 + slack_m;
+        let reach = self.spacing_m() * 3f64.sqrt() * 0.5 + slack_m;
         let known = distances_m.iter().filter(|d| d.is_finite()).count();
         if known < distances_m.len() {
             return known > 0;
@@ -94,6 +110,10 @@ pub struct BlockMesher {
     done: u64,
     /// Vertices on block borders by global edge key (grid point * 3 + axis, z slowest).
     border: BTreeMap<u64, u32>,
+    /// Distances on the borders towards later blocks, see [`BlockMesher::reconcile`].
+    shared: [Vec<f32>; 3],
+    /// Distances of the current block.
+    distances: Vec<f32>,
     /// Vertices of the current block by local edge; kept to save allocations.
     local: Vec<u32>,
     tables: Vec<Vec<[u8; 3]>>,
@@ -148,6 +168,8 @@ impl BlockMesher {
             issued: 0,
             done: 0,
             border: BTreeMap::new(),
+            shared: Default::default(),
+            distances: Vec::new(),
             local: Vec::new(),
             tables: triangle_tables(),
             mesh: Mesh::default(),
@@ -177,14 +199,14 @@ impl BlockMesher {
         for a in 0..3 {
             dims[a] = (self.cells[a] - first[a]).min(self.block_cells) + 1;
         }
-        let offset = DVec3::from_array(first.map(f64::from)) * self.spacing_m;
         self.issued += 1;
         Some(Block {
             sequence: self.issued - 1,
+            grid_origin: self.origin,
+            grid_spacing_m: self.spacing_m,
             first,
-            origin: self.origin + offset,
             dims,
-            spacing_m: self.spacing_m,
+            stride: 1,
         })
     }
 
@@ -194,6 +216,9 @@ impl BlockMesher {
     /// [`MeshError::BlockOrder`] when another block is due.
     pub fn skip_block(&mut self, block: &Block) -> Result<(), MeshError> {
         self.check_order(block)?;
+        self.distances.clear();
+        self.distances.resize(block.points(), f32::NAN);
+        self.reconcile(block);
         self.finish_block(block);
         Ok(())
     }
@@ -220,9 +245,14 @@ impl BlockMesher {
                 expected: "a coarser resolution".into(),
             });
         }
-        let inside = distances_m.iter().filter(|&&d| d < 0.0).count();
-        if inside > 0 && inside < distances_m.len() {
-            self.mesh_cells(block, distances_m);
+        self.distances.clear();
+        self.distances.extend_from_slice(distances_m);
+        self.reconcile(block);
+        let inside = self.distances.iter().filter(|&&d| d < 0.0).count();
+        if inside > 0 && inside < self.distances.len() {
+            let distances = core::mem::take(&mut self.distances);
+            self.mesh_cells(block, &distances);
+            self.distances = distances;
         }
         self.finish_block(block);
         Ok(())
@@ -248,6 +278,46 @@ impl BlockMesher {
             // The next layer shares only this one's topmost plane.
             let top = block.first[2] + block.dims[2] - 1;
             self.border = self.border.split_off(&self.edge_key([0, 0, top], 0));
+        }
+    }
+
+    /// Where blocks share a point, the first known distance counts for all: a device may round the
+    /// position or the sum differently in each block, and a sign that flips would be a crack.
+    ///
+    /// `shared[a]` holds the distances on the borders across axis a: one block's face for x, a
+    /// row of blocks for y, a layer for z.
+    fn reconcile(&mut self, block: &Block) {
+        let side = self.block_cells as usize + 1;
+        let row = self.cells[0] as usize + 1;
+        if self.shared[0].is_empty() {
+            let layer = row * (self.cells[1] as usize + 1);
+            self.shared = [side * side, row * side, layer].map(|n| vec![f32::NAN; n]);
+        }
+        let [nx, ny, nz] = block.dims.map(|d| d as usize);
+        let [first_x, first_y, _] = block.first.map(|i| i as usize);
+        for z in 0..nz {
+            for y in 0..ny {
+                // Within the block only the two ends of a row can be on a border.
+                let whole_row = y == 0 || z == 0 || y + 1 == ny || z + 1 == nz;
+                for x in (0..nx).step_by(if whole_row { 1 } else { nx - 1 }) {
+                    let at = [x, y, z];
+                    let slots =
+                        [z * side + y, z * row + first_x + x, (first_y + y) * row + first_x + x];
+                    let mut d = self.distances[(z * ny + y) * nx + x];
+                    // The first axis alone: the slots of the others may already hold what this
+                    // block's neighbour wrote for the blocks to come.
+                    if let Some(a) = (0..3).find(|&a| at[a] == 0 && block.first[a] > 0) {
+                        let known = self.shared[a][slots[a]];
+                        d = if known.is_finite() { known } else { d };
+                        self.distances[(z * ny + y) * nx + x] = d;
+                    }
+                    for a in 0..3 {
+                        if at[a] + 1 == block.dims[a] as usize {
+                            self.shared[a][slots[a]] = d;
+                        }
+                    }
+                }
+            }
         }
     }
 
@@ -427,6 +497,27 @@ mod tests {
         let mesh = mesher.finish();
         assert!(!mesh.triangles.is_empty());
         assert!(mesh.positions.iter().all(|p| p[0] <= 1e-6));
+    }
+
+    #[test]
+    fn blocks_that_disagree_on_shared_points_leave_no_cracks() {
+        // Rounding noise that differs from block to block around a plane through grid points.
+        let mut mesher = BlockMesher::with_block_cells(cube_bounds(1.0), 0.125, 4).unwrap();
+        while let Some(block) = mesher.next_block() {
+            let d: Vec<f32> = (0..block.points())
+                .map(|i| {
+                    let p = block.point(i);
+                    if p.abs().max_element() > 0.9 {
+                        return 1.0;
+                    }
+                    let noise = (i as u64 + 977 * block.sequence).wrapping_mul(0x9e37_79b9) >> 7;
+                    p.z.abs() as f32 - 0.5 + ((noise % 5) as f32 - 2.0) * 1e-6
+                })
+                .collect();
+            mesher.add_block(&block, &d).unwrap();
+        }
+        let t = topology(&mesher.finish());
+        assert_eq!((t.boundary_edges, t.bad_edges, t.components, t.euler), (0, 0, 1, 2));
     }
 
     #[test]

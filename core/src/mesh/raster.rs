@@ -23,25 +23,48 @@ pub struct Raster {
     pub triangle: Vec<u32>,
 }
 
-/// A triangle in the image: pixel positions and 1 / depth of the corners.
+/// A triangle in the image that covers the box of pixels from `low` to `high`.
 struct Projected {
+    /// Pixel positions and 1 / depth.
     corners: [[f32; 3]; 3],
+    low: [u32; 2],
+    high: [u32; 2],
     triangle: u32,
+}
+
+/// A vertex in the camera's frame \[m\] and, if before the near plane, in the image.
+struct Vertex {
+    camera: [f32; 3],
+    image: Option<[f32; 3]>,
+}
+
+/// Pixel position and 1 / depth of a point in the camera's frame.
+fn to_image(camera: &Camera, p: DVec3) -> [f32; 3] {
+    let inverse = 1.0 / p.z;
+    let (u, v) = (camera.fx * p.x * inverse + camera.cx, camera.fy * p.y * inverse + camera.cy);
+    [u as f32, v as f32, inverse as f32]
 }
 
 /// Render a mesh, both sides of its triangles.
 pub fn rasterise(mesh: &Mesh, camera: &Camera, world_from_camera: &Pose) -> Raster {
     let camera_from_world = world_from_camera.inverse();
-    let points: Vec<[f32; 3]> = parallel::map(mesh.positions.len(), |i| {
+    let vertices: Vec<Vertex> = parallel::map(mesh.positions.len(), |i| {
         let p = camera_from_world.transform_point(to_dvec3(mesh.positions[i]));
-        p.to_array().map(|x| x as f32)
+        // Not `z < near`: a NaN must not pass.
+        let image = (p.z >= NEAR_M).then(|| to_image(camera, p));
+        Vertex { camera: p.to_array().map(|x| x as f32), image }
     });
     let chunks = mesh.triangles.len().div_ceil(CHUNK);
     let projected: Vec<Vec<Projected>> = parallel::map(chunks, |c| {
         let mut out = Vec::new();
         let end = ((c + 1) * CHUNK).min(mesh.triangles.len());
         for t in c * CHUNK..end {
-            project(mesh.triangles[t].map(|i| points[i as usize]), t as u32, camera, &mut out);
+            let corners = mesh.triangles[t].map(|i| &vertices[i as usize]);
+            if let [Some(a), Some(b), Some(c)] = corners.map(|v| v.image) {
+                out.extend(boxed([a, b, c], t as u32, camera));
+            } else if corners.iter().any(|v| v.image.is_some()) {
+                cut_at_near_plane(corners, t as u32, camera, &mut out);
+            }
         }
         out
     });
@@ -60,69 +83,69 @@ pub fn rasterise(mesh: &Mesh, camera: &Camera, world_from_camera: &Pose) -> Rast
     }
 }
 
-/// Cut at the near plane, project, and keep what can touch the image.
-fn project(corners: [[f32; 3]; 3], triangle: u32, camera: &Camera, out: &mut Vec<Projected>) {
-    // Not `z < near`: a NaN must not pass.
-    let in_front = corners.map(|p| f64::from(p[2]) >= NEAR_M);
-    if !in_front.contains(&true) {
-        return;
-    }
-    let points = corners.map(to_dvec3);
-    let mut polygon: [DVec3; 4] = [DVec3::ZERO; 4];
+/// What is left of a triangle before the near plane, as one or two triangles.
+fn cut_at_near_plane(
+    corners: [&Vertex; 3],
+    triangle: u32,
+    camera: &Camera,
+    out: &mut Vec<Projected>,
+) {
+    let mut polygon = [DVec3::ZERO; 4];
     let mut n = 0;
     for i in 0..3 {
-        let (a, b) = (points[i], points[(i + 1) % 3]);
-        if in_front[i] {
+        let (from, to) = (corners[i], corners[(i + 1) % 3]);
+        let (a, b) = (to_dvec3(from.camera), to_dvec3(to.camera));
+        if from.image.is_some() {
             polygon[n] = a;
             n += 1;
         }
-        if in_front[i] != in_front[(i + 1) % 3] {
+        if from.image.is_some() != to.image.is_some() {
             polygon[n] = a + (b - a) * ((NEAR_M - a.z) / (b.z - a.z));
             n += 1;
         }
     }
-    let image = |p: DVec3| {
-        let (u, v) = (camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy);
-        [u as f32, v as f32, (1.0 / p.z) as f32]
-    };
-    for i in 2..n {
-        let corners = [image(polygon[0]), image(polygon[i - 1]), image(polygon[i])];
-        let outside = |axis: usize, size: u32| {
-            let limit = size as f32 - 1.0;
-            corners.iter().all(|c| c[axis] < 0.0) || corners.iter().all(|c| c[axis] > limit)
-        };
-        let finite = corners.iter().flatten().all(|x| x.is_finite());
-        if finite && !outside(0, camera.width) && !outside(1, camera.height) {
-            out.push(Projected { corners, triangle });
+    let image = polygon.map(|p| to_image(camera, p));
+    out.extend((2..n).filter_map(|i| boxed([image[0], image[i - 1], image[i]], triangle, camera)));
+}
+
+/// The box of pixel centres that a triangle may cover; `None` if there are none, as for most
+/// triangles of a fine mesh.
+fn boxed(corners: [[f32; 3]; 3], triangle: u32, camera: &Camera) -> Option<Projected> {
+    let [a, b, c] = &corners;
+    let (mut low, mut high) = ([0; 2], [0; 2]);
+    for (axis, size) in [(0, camera.width), (1, camera.height)] {
+        let first = a[axis].min(b[axis]).min(c[axis]).ceil().max(0.0);
+        let last = a[axis].max(b[axis]).max(c[axis]).floor().min(size as f32 - 1.0);
+        if first > last {
+            return None;
         }
+        (low[axis], high[axis]) = (first as u32, last as u32);
     }
+    // `min` and `max` pass over a NaN, so it is looked for here.
+    let finite = corners.iter().flatten().all(|x| x.is_finite());
+    finite.then_some(Projected { corners, low, high, triangle })
 }
 
 /// Draw into rows `first_row..` of the image.
 fn draw(p: &Projected, first_row: usize, width: usize, pixels: &mut [(f32, u32)]) {
-    let rows = pixels.len() / width;
+    let end_row = first_row + pixels.len() / width;
+    let rows = (p.low[1] as usize).max(first_row)..(p.high[1] as usize + 1).min(end_row);
+    if rows.is_empty() {
+        return;
+    }
     let [a, b, c] = p.corners.map(to_dvec3);
-    let range = |axis: usize, first: usize, count: usize| {
-        let low = a[axis].min(b[axis]).min(c[axis]).ceil().max(first as f64);
-        let high = a[axis].max(b[axis]).max(c[axis]).floor().min((first + count) as f64 - 1.0);
-        if low > high { 0..0 } else { low as usize..high as usize + 1 }
-    };
-    let ys = range(1, first_row, rows);
-    if ys.is_empty() {
-        return;
-    }
     let area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-    let xs = range(0, 0, width);
-    if area == 0.0 || xs.is_empty() {
+    if area == 0.0 {
         return;
     }
-    for y in ys {
-        let v = y as f64;
-        for x in xs.clone() {
-            let u = x as f64;
+    let inverse_area = 1.0 / area;
+    for y in rows {
+        let v = y as f64 - a.y;
+        for x in p.low[0] as usize..p.high[0] as usize + 1 {
+            let u = x as f64 - a.x;
             // Barycentric coordinates, with room for rounding so that neighbours leave no gaps.
-            let wb = ((u - a.x) * (c.y - a.y) - (v - a.y) * (c.x - a.x)) / area;
-            let wc = ((b.x - a.x) * (v - a.y) - (b.y - a.y) * (u - a.x)) / area;
+            let wb = (u * (c.y - a.y) - v * (c.x - a.x)) * inverse_area;
+            let wc = ((b.x - a.x) * v - (b.y - a.y) * u) * inverse_area;
             let wa = 1.0 - wb - wc;
             if wa < -1e-7 || wb < -1e-7 || wc < -1e-7 {
                 continue;

@@ -100,6 +100,11 @@ impl<S: Shape> Bvh<S> {
         Bvh { nodes, shapes: indices.iter().map(|&i| shapes[i as usize]).collect(), indices }
     }
 
+    /// The shapes, neighbours next to each other.
+    pub(crate) fn shapes(&self) -> &[S] {
+        &self.shapes
+    }
+
     /// The nearest shape closer than `limit`: its index in the list given, and the square of its
     /// distance. Of equally near ones, any, but always the same.
     pub(crate) fn nearest(&self, p: DVec3, limit: f64) -> Option<(u32, f64)> {

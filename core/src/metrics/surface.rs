@@ -180,14 +180,16 @@ pub fn evaluate_surface(
     let of_truth = sample_surface(truth, samples, seed, 1, "true")?;
     let again = sample_surface(truth, samples, seed, 2, "true")?;
     let (estimate_points, truth_points) = (Bvh::new(&of_estimate), Bvh::new(&of_truth));
+    // Neighbouring queries visit the same nodes: points in the order of their own tree are twice
+    // as fast to look up.
     let point_to_point = figures(
-        &distances(&of_estimate, &truth_points),
-        &distances(&of_truth, &estimate_points),
+        &distances(estimate_points.shapes(), &truth_points),
+        &distances(truth_points.shapes(), &estimate_points),
         threshold_m,
     );
     let sampling_floor_cm = 100.0 * mean(&distances(&again, &truth_points));
-    let accuracy = distances(&of_estimate, &Bvh::new(&triangles(truth)));
-    let completion = distances(&of_truth, &Bvh::new(&triangles(estimate)));
+    let accuracy = distances(estimate_points.shapes(), &Bvh::new(&triangles(truth)));
+    let completion = distances(truth_points.shapes(), &Bvh::new(&triangles(estimate)));
     Ok(SurfaceReport {
         protocol: format!(
             "mesh: {samples} area-weighted samples a mesh, ratio under {} cm",

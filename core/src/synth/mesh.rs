@@ -7,8 +7,6 @@ use super::{
 };
 use alloc::vec::Vec;
 use glam::Vec3;
-#[cfg(not(feature = "std"))]
-use num_traits::Float as _;
 
 /// Edge of the squares that flat faces are cut into \[m\].
 const CELL_M: f32 = 0.05;

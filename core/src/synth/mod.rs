@@ -46,7 +46,7 @@ pub struct SyntheticOptions {
     /// Image height \[pixels\], brought into 8..=4096.
     pub height: u32,
     /// Number of frames; a longer sequence begins with the shorter one. The path closes after
-    /// about 240 frames and is then walked again.
+    /// about 290 frames and is then walked again.
     pub frames: usize,
     /// Changes colours, patterns, small things and the shake of the hand; not the layout.
     pub seed: u64,

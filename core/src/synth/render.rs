@@ -70,26 +70,26 @@ pub fn render(scene: &Scene, camera: &Camera, pose: &Pose) -> Image {
     par_chunks(&mut color, w, |v, row| {
         for (u, out) in row.iter_mut().enumerate() {
             let hit = hits[v * w + u];
-            let same = |x: usize, y: usize| {
-                let other = &hits[y * w + x];
-                other.primitive == hit.primitive && other.face == hit.face
-            };
-            let (l, r) = (u.saturating_sub(1), (u + 1).min(w - 1));
-            let (t, b) = (v.saturating_sub(1), (v + 1).min(h - 1));
-            // Inside a surface's outline its four samples need no search through the scene.
-            let inner = same(l, t)
-                && same(u, t)
-                && same(r, t)
-                && same(l, v)
-                && same(r, v)
-                && same(l, b)
-                && same(u, b)
-                && same(r, b);
+            // The samples see what this pixel and its neighbours see: no search of the scene.
+            let mut near = [hit; 9];
+            let mut count = 1;
+            for y in v.saturating_sub(1)..=(v + 1).min(h - 1) {
+                for x in u.saturating_sub(1)..=(u + 1).min(w - 1) {
+                    let other = hits[y * w + x];
+                    if near[..count].iter().all(|n| n.primitive != other.primitive) {
+                        near[count] = other;
+                        count += 1;
+                    }
+                }
+            }
             let mut sum = Vec3::ZERO;
             for (du, dv) in [(-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)] {
                 let d = rays.direction(u as f32 + du, v as f32 + dv);
-                let again = if inner { scene.retrace(&hit, rays.origin, d) } else { None };
-                let s = again.unwrap_or_else(|| scene.trace(rays.origin, d));
+                let s = near[..count]
+                    .iter()
+                    .filter_map(|n| scene.retrace(n.primitive, rays.origin, d))
+                    .min_by(|a, b| a.t.total_cmp(&b.t))
+                    .unwrap_or_else(|| scene.trace(rays.origin, d));
                 let p = rays.origin + d * s.t;
                 let cos = scene.normal(&s, p).dot(d).abs() / d.length();
                 // Half a pixel, stretched where the surface is seen at a slant.

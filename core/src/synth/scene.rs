@@ -245,7 +245,7 @@ impl Scene {
         let room = Room { shell };
         let path = Path::new(&waypoints, b.rng.next());
         let bvh = Bvh::new(&b.primitives);
-        let ambient = Vec3::splat(0.62);
+        let ambient = Vec3::splat(0.50);
         let light = LightMaps::bake(&room, &b.primitives, &bvh, &b.lights, ambient);
         Scene { room, primitives: b.primitives, path, materials: b.materials, bvh, light }
     }
@@ -256,16 +256,13 @@ impl Scene {
         self.bvh.nearest(&self.primitives, o, d, wall.t).unwrap_or(wall)
     }
 
-    /// The hit of a ray with one surface, if that is not missed.
-    pub fn retrace(&self, like: &Hit, o: Vec3, d: Vec3) -> Option<Hit> {
-        let hit = match self.primitives.get(like.primitive as usize) {
-            Some(solid) => {
-                let (t, face) = solid.intersect(o, d, 1e-4, f32::MAX)?;
-                Hit { t, primitive: like.primitive, face }
-            }
-            None => self.shell_hit(o, d),
+    /// The hit of a ray with one solid (or the shell), if it is not missed.
+    pub fn retrace(&self, primitive: u32, o: Vec3, d: Vec3) -> Option<Hit> {
+        let Some(solid) = self.primitives.get(primitive as usize) else {
+            return Some(self.shell_hit(o, d));
         };
-        (hit.face == like.face).then_some(hit)
+        let (t, face) = solid.intersect(o, d, 1e-4, f32::MAX)?;
+        Some(Hit { t, primitive, face })
     }
 
     fn shell_hit(&self, o: Vec3, d: Vec3) -> Hit {
@@ -311,7 +308,7 @@ impl Scene {
         let light = self.light.sample(primitive, face, &chart, solid.shape);
         let c = albedo * (light + paint.glow);
         // A soft shoulder instead of clipping where a lamp shines.
-        c * 1.12 / (Vec3::ONE + 0.18 * c)
+        c * 1.10 / (Vec3::ONE + 0.18 * c)
     }
 
     /// All solids with their numbers, the shell last.

@@ -16,7 +16,7 @@ const FARTHEST_M: f32 = 5.5;
 /// Depth \[m\] in units of the sequence, 0 (invalid) where it does not fit.
 pub fn quantise(depth_m: f32) -> u16 {
     let units = f64::from(depth_m) / super::DEPTH_UNIT_M + 0.5;
-    if units >= 1.0 && units < 65536.0 { units as u16 } else { 0 }
+    if (1.0..65536.0).contains(&units) { units as u16 } else { 0 }
 }
 
 /// Noise along the ray that grows with depth, disparity steps, jitter along outlines, and holes at
@@ -41,8 +41,7 @@ pub fn degrade(image: &Image, camera: &Camera, seed: u64, index: usize) -> Vec<u
             let right = image.depth_m[at(u + 1, v)].min(image.depth_m[at(u + 2, v)]);
             let shadow = z0 - right > 0.06 + 0.02 * z0;
             let slant = image.facing[at(u, v)];
-            let lost = z < NEAREST_M
-                || z > FARTHEST_M
+            let lost = !(NEAREST_M..=FARTHEST_M).contains(&z)
                 || (shadow && random(9) < 0.85)
                 || slant < 0.10 + 0.12 * random(10)
                 || random(11) < 0.002;
@@ -50,7 +49,7 @@ pub fn degrade(image: &Image, camera: &Camera, seed: u64, index: usize) -> Vec<u
                 out.push(0);
                 continue;
             }
-            let sigma = (0.0010 + 0.0016 * (z - 0.4) * (z - 0.4)) / slant.max(0.35).min(1.0);
+            let sigma = (0.0010 + 0.0016 * (z - 0.4) * (z - 0.4)) / slant.clamp(0.35, 1.0);
             // Part of the error is shared by neighbours, as in a matched window.
             let scale = 48.0 / w as f32;
             let shared = noise(u as f32 * scale * 4.0, v as f32 * scale * 4.0, frame);

@@ -361,7 +361,8 @@ impl Material {
             let length = unit(hash2(row, 2, seed)) * half[0] * 0.9;
             let from_left = s + 0.88 * half[0] - indent;
             let word = hash2(row, col / 4, seed);
-            let on = from_left > 0.0 && from_left < length && hash2(row, col, seed) % 6 != 0;
+            let on =
+                from_left > 0.0 && from_left < length && !hash2(row, col, seed).is_multiple_of(6);
             let ink = line(fract(t / 0.016) - 0.5, 0.28, fp / 0.016);
             let text = 0.25 + 0.7 * rainbow(word);
             c = mix(Vec3::splat(0.025), text, if on { ink } else { 0.0 });

@@ -8,9 +8,9 @@ use glam::{DMat3, DVec3};
 use num_traits::Float as _;
 
 /// Translation that takes one frame when nothing turns \[m\].
-const STEP_M: f64 = 0.024;
+const STEP_M: f64 = 0.028;
 /// Rotation that takes one frame when nothing moves \[rad\].
-const STEP_RAD: f64 = 0.033;
+const STEP_RAD: f64 = 0.038;
 const SAMPLES: usize = 3000;
 
 /// Where the camera is and what it looks at \[m\].

@@ -13,6 +13,29 @@ use glam::{Mat3, Vec3};
 const BLACK: [u8; 3] = [30, 30, 34];
 const STEEL: [u8; 3] = [150, 154, 160];
 
+/// Cloth and paper covers of books.
+const COVERS: [[u8; 3]; 14] = [
+    [122, 44, 40],
+    [158, 72, 48],
+    [186, 128, 60],
+    [206, 184, 132],
+    [92, 104, 58],
+    [52, 84, 64],
+    [60, 104, 112],
+    [48, 68, 104],
+    [82, 110, 146],
+    [96, 64, 96],
+    [66, 52, 46],
+    [190, 186, 176],
+    [46, 48, 54],
+    [170, 92, 96],
+];
+
+/// A colour close to `color`.
+fn tint(b: &mut Builder, color: [u8; 3]) -> [u8; 3] {
+    color.map(|c| (f32::from(c) * b.rng.range(0.85, 1.2)) as u8)
+}
+
 /// A table with four legs.
 pub fn table(b: &mut Builder, top: u16, legs: u16, size: [f32; 3]) {
     let [x, y, h] = [0.5 * size[0], 0.5 * size[1], size[2]];
@@ -112,10 +135,10 @@ pub fn books(b: &mut Builder, range: [f32; 2], front: f32, z: f32, tall: f32) {
         let h = tall * b.rng.range(0.72, 1.0);
         let depth = b.rng.range(0.14, 0.19);
         let inset = b.rng.range(0.0, 0.025);
-        let hue = b.rng.next();
-        let c = |k: u32| (30 + (hue >> k) % 190) as u8;
+        let cover = b.rng.pick(&COVERS);
         let ink = b.rng.pick(&inks);
-        let paint = b.paint(Pattern::Spine, [c(0), c(8), c(16)], ink, 1.0);
+        let cover = tint(b, cover);
+        let paint = b.paint(Pattern::Spine, cover, ink, 1.0);
         b.block(
             Kind::book,
             paint,
@@ -123,7 +146,7 @@ pub fn books(b: &mut Builder, range: [f32; 2], front: f32, z: f32, tall: f32) {
             [x + w - 0.002, front + inset + depth, z + h],
         );
         x += w;
-        if b.rng.next() % 9 == 0 {
+        if b.rng.next().is_multiple_of(9) {
             x += b.rng.range(0.04, 0.12);
         }
     }
@@ -134,9 +157,9 @@ pub fn book_stack(b: &mut Builder, at: [f32; 3], count: usize) {
     let mut z = at[2];
     for _ in 0..count {
         let h = b.rng.range(0.02, 0.045);
-        let hue = b.rng.next();
-        let c = |k: u32| (40 + (hue >> k) % 180) as u8;
-        let paint = b.paint(Pattern::Spine, [c(0), c(8), c(16)], [235, 225, 200], 1.0);
+        let cover = b.rng.pick(&COVERS);
+        let cover = tint(b, cover);
+        let paint = b.paint(Pattern::Spine, cover, [235, 225, 200], 1.0);
         let turn = yaw(b.rng.range(-25.0, 25.0));
         let half = [b.rng.range(0.10, 0.13), b.rng.range(0.075, 0.095), 0.5 * h];
         b.tilted(Kind::book, paint, [at[0], at[1], z + 0.5 * h], half, turn);

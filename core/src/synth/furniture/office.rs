@@ -48,7 +48,7 @@ pub fn build(b: &mut Builder) -> (Primitive, Vec<Waypoint>) {
     // North: two workplaces under the window.
     b.place([0.0, y, 0.0], 0.0);
     skirting(b, [-x + 0.017, x - 0.017], grey);
-    window(b, [0.1, 1.68], [1.9, 1.0], Vec3::new(0.92, 0.98, 1.05) * 4.0);
+    window(b, [0.1, 1.68], [1.9, 1.0], Vec3::new(0.92, 0.98, 1.05) * 5.0);
     let blind = b.paint(Pattern::Fabric, [196, 186, 160], [170, 158, 130], 0.8);
     curtain(b, [-1.36, -0.92], [1.02, 2.36], blind);
     curtain(b, [1.12, 1.56], [1.02, 2.36], blind);
@@ -101,7 +101,7 @@ pub fn build(b: &mut Builder) -> (Primitive, Vec<Waypoint>) {
     ];
     let cover = b.paint(Pattern::Fabric, [92, 84, 80], [140, 128, 118], 1.0);
     sofa(b, cover, 1.55, &cushions);
-    b.place([0.12, -y + 0.35, 0.0], 0.0);
+    b.place([-1.95, -y + 0.32, 0.0], 0.0);
     floor_lamp(b);
     b.place([-0.85, -y + 0.24, 0.0], 180.0);
     let front = b.paint(Pattern::Panels, [186, 150, 104], [200, 168, 122], 2.0);

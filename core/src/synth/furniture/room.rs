@@ -34,7 +34,7 @@ pub fn build(b: &mut Builder) -> (Primitive, Vec<Waypoint>) {
         );
     }
     b.place([0.8, 0.0, 0.0], 0.0);
-    pendant(b, h, 0.34, Vec3::new(1.0, 0.88, 0.70) * 1.9);
+    pendant(b, h, 0.34, Vec3::new(1.0, 0.88, 0.70) * 2.1);
 
     // West: sofa, three pictures, a floor lamp, a plant.
     b.place([-x, 0.0, 0.0], 90.0);
@@ -60,7 +60,7 @@ pub fn build(b: &mut Builder) -> (Primitive, Vec<Waypoint>) {
     // North: window with curtains over a low cabinet; a desk.
     b.place([0.0, y, 0.0], 0.0);
     skirting(b, [-x + 0.017, x - 0.017], white);
-    window(b, [-0.62, 1.52], [1.35, 1.15], Vec3::new(0.90, 0.97, 1.06) * 4.4);
+    window(b, [-0.62, 1.52], [1.35, 1.15], Vec3::new(0.90, 0.97, 1.06) * 5.4);
     let drape = b.paint(Pattern::Fabric, [150, 70, 62], [196, 128, 104], 0.7);
     curtain(b, [-1.66, -1.30], [0.62, 2.28], drape);
     curtain(b, [0.06, 0.42], [0.62, 2.28], drape);

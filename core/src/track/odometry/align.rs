@@ -202,7 +202,6 @@ pub(super) fn align_levels(
         Some(n) => n,
         None => build(references, current, &pose, config, finest, &states),
     };
-    let used = current.levels[finest.min(top)].points.len().max(1) as f64;
     let mut result = Alignment {
         pose,
         information: normal.h,
@@ -218,8 +217,7 @@ pub(super) fn align_levels(
         unconstrained: spectrum.1,
     };
     let (mut g, mut p) = ([0.0; 2], [0.0; 2]);
-    let mut score = [0.0; 2];
-    for (s, state) in normal.sums.iter().zip(&states) {
+    for s in &normal.sums {
         result.inliers += s.inliers as usize;
         let overlap = f64::from(s.inliers) / f64::from(s.tried.max(1));
         result.overlaps.push(overlap);
@@ -229,18 +227,15 @@ pub(super) fn align_levels(
             // A handful of points that agree by accident is not agreement.
             let enough = (f64::from(s.in_view) / 200.0).min(1.0);
             result.inlier_ratio = enough * f64::from(s.inliers) / f64::from(s.in_view.max(1));
-            let agreement = f64::from(state.geometric_scale) * f64::from(s.in_view)
-                / f64::from(s.inliers.max(1));
-            score =
-                [agreement.min(1e3) + 40.0 * f64::from(state.photometric_sigma), share.max(0.05)];
+            // The square root leans towards the pose that sees more, not fully.
+            result.score =
+                s.fixed_cost / f64::from(s.in_view.max(1)) / share.max(0.05).sqrt().max(0.3);
         }
         for i in 0..2 {
             g[i] += s.geometric_square[i];
             p[i] += s.photometric_square[i];
         }
     }
-    let _ = used;
-    result.score = score[0] / score[1];
     result.geometric_rmse_m = (g[0] / g[1].max(1.0)).sqrt();
     result.photometric_rmse = (p[0] / p[1].max(1.0)).sqrt();
     Ok(result)

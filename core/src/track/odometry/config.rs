@@ -113,6 +113,11 @@ pub struct OdometryConfig {
     pub max_step_m: f64,
     /// Largest rotation between frames \[rad\].
     pub max_step_rad: f64,
+    /// From this motion a frame on, corners are matched for a second start: translation over
+    /// median depth plus rotation \[rad\].
+    pub wide_motion: f64,
+    /// Below this inlier share corners are matched for a second start, too.
+    pub doubtful_inlier_ratio: f64,
     /// Refine keyframe poses in a graph of pairwise alignments whenever a keyframe is added.
     pub pose_graph: bool,
     /// Keyframes a new one is linked with in the graph.
@@ -133,6 +138,8 @@ impl Default for OdometryConfig {
             min_overlap: 0.12,
             max_step_m: 0.6,
             max_step_rad: 0.8,
+            wide_motion: 0.06,
+            doubtful_inlier_ratio: 0.85,
             pose_graph: false,
             graph_links: 6,
         }

@@ -6,6 +6,7 @@
 //! A frame costs milliseconds; nothing here needs a device.
 mod align;
 mod config;
+mod features;
 mod linear;
 mod odometer;
 mod pose_graph;

@@ -3,12 +3,14 @@ use super::{
     OdometryError,
     align::{Alignment, Reference, align_levels},
     config::OdometryConfig,
+    features::Features,
     pose_graph::{Edge, PoseGraph},
     pyramid::RgbdPyramid,
     thumbnail::Thumbnail,
 };
 use crate::pose::Pose;
 use alloc::{collections::BTreeMap, vec::Vec};
+use glam::{DMat3, DVec3};
 
 /// A frame that others are aligned with.
 #[derive(Clone, Debug)]
@@ -21,6 +23,7 @@ pub struct Keyframe {
     pub world_from_camera: Pose,
     pyramid: RgbdPyramid,
     thumbnail: Thumbnail,
+    features: Features,
 }
 
 /// Why a frame counts as lost.
@@ -234,19 +237,19 @@ impl Odometer {
         let mut found = None;
         let mut reason = LostReason::NoDepth;
         if current.check().is_ok() {
-            let mut best = self.attempt(&last, &last_pose, &current, &predicted)?;
-            reason = self.judge(&best.0, &last_pose).err().unwrap_or(LostReason::FewInliers);
-            if self.judge(&best.0, &last_pose).is_err() || self.lost_streak > 0 {
-                recovered = true;
-                for (start, id) in self.starts(&current, &last_pose) {
-                    let other = match id {
-                        None => self.attempt(&last, &last_pose, &current, &start)?,
-                        Some(k) => {
-                            let k = &self.keyframes[k];
-                            let (p, at) = (&k.pyramid, k.world_from_camera);
-                            self.attempt(p, &at, &current, &start)?
-                        }
-                    };
+            let mut best = self.attempt(Some((&last, &last_pose)), &current, &predicted)?;
+            let verdict = self.judge(&best.0, &last_pose);
+            let step = last_pose.inverse().compose(&best.0.pose);
+            let motion =
+                step.translation.length() / current.median_depth_m.max(0.2) + step.angle_rad();
+            if verdict.is_err()
+                || self.lost_streak > 0
+                || motion > self.config.wide_motion
+                || best.0.inlier_ratio < self.config.doubtful_inlier_ratio
+            {
+                recovered = verdict.is_err() || self.lost_streak > 0;
+                for start in self.search(&last, &last_pose, &current, &predicted, recovered)? {
+                    let other = self.attempt(None, &current, &start)?;
                     if other.0.score < best.0.score {
                         best = other;
                     }
@@ -320,15 +323,20 @@ impl Odometer {
     /// Returns the alignment and the identifiers of the keyframes used, best first.
     fn attempt(
         &self,
-        near: &RgbdPyramid,
-        near_pose: &Pose,
+        near: Option<(&RgbdPyramid, &Pose)>,
         current: &RgbdPyramid,
         start: &Pose,
     ) -> Result<(Alignment, Vec<usize>), OdometryError> {
-        let near_reference =
-            Reference { pyramid: near, world_from_camera: *near_pose, weight: 1.0 };
+        let near_reference = near.map(|(pyramid, pose)| Reference {
+            pyramid,
+            world_from_camera: *pose,
+            weight: 1.0,
+        });
         let align = &self.config.align;
-        let coarse = align_levels(&[near_reference], current, start, align, usize::MAX, 1)?.pose;
+        let coarse = match near_reference {
+            Some(r) => align_levels(&[r], current, start, align, usize::MAX, 1)?.pose,
+            None => *start,
+        };
         let chosen = self.choose(current, &coarse, self.config.references.max(1));
         let mut references: Vec<Reference<'_>> = chosen
             .iter()
@@ -339,7 +347,15 @@ impl Odometer {
             })
             .collect();
         if self.config.last_frame || references.is_empty() {
-            references.push(near_reference);
+            references.extend(near_reference);
+        }
+        if references.is_empty() {
+            // Nothing overlaps with a start that matched corners gave: take what there is.
+            references.extend(self.keyframes.last().map(|k| Reference {
+                pyramid: &k.pyramid,
+                world_from_camera: k.world_from_camera,
+                weight: 1.0,
+            }));
         }
         let fit = align_levels(&references, current, &coarse, align, 2, 0)?;
         Ok((fit, chosen.iter().map(|&k| self.keyframes[k].id).collect()))
@@ -389,12 +405,84 @@ impl Odometer {
         Ok(())
     }
 
-    /// Other places to start from: standing still, small turns, and the keyframes that look alike.
-    fn starts(&self, current: &RgbdPyramid, last_pose: &Pose) -> Vec<(Pose, Option<usize>)> {
-        let mut out: Vec<(Pose, Option<usize>)> = alloc::vec![(*last_pose, None)];
-        for (x, y) in [(0.15, 0.0), (-0.15, 0.0), (0.0, 0.15), (0.0, -0.15)] {
-            out.push((last_pose.compose(&Pose::from_twist(&[0.0, 0.0, 0.0, x, y, 0.0])), None));
+    /// Poses from matched corners with the last frame and with the likeliest keyframes.
+    fn matched_starts(
+        &self,
+        last: &RgbdPyramid,
+        last_pose: &Pose,
+        current: &RgbdPyramid,
+        lost: bool,
+    ) -> Vec<Pose> {
+        let features = Features::new(current);
+        let mut out = Vec::new();
+        if let Some(m) = Features::new(last).locate(&features) {
+            out.push((m.inliers, last_pose.compose(&m.reference_from_current)));
         }
+        let nearby = if lost { self.alike(current, 6) } else { self.choose(current, last_pose, 2) };
+        for i in nearby {
+            let k = &self.keyframes[i];
+            if let Some(m) = k.features.locate(&features) {
+                out.push((m.inliers, k.world_from_camera.compose(&m.reference_from_current)));
+            }
+        }
+        out.sort_by(|a, b| b.0.cmp(&a.0));
+        out.truncate(2);
+        out.into_iter().map(|(_, pose)| pose).collect()
+    }
+
+    /// The most promising of many starts, after coarse alignment: matched corners, standing still,
+    /// turning, moving around the scene's centre, and the keyframes that look alike when lost.
+    fn search(
+        &self,
+        last: &RgbdPyramid,
+        last_pose: &Pose,
+        current: &RgbdPyramid,
+        predicted: &Pose,
+        lost: bool,
+    ) -> Result<Vec<Pose>, OdometryError> {
+        let mut starts: Vec<(Pose, usize, &RgbdPyramid, Pose)> = Vec::new();
+        for pose in self.matched_starts(last, last_pose, current, lost) {
+            starts.push((pose, 2, last, *last_pose));
+        }
+        starts.push((*predicted, usize::MAX, last, *last_pose));
+        starts.push((*last_pose, usize::MAX, last, *last_pose));
+        let depth = last.median_depth_m().max(0.2);
+        let centre = Pose { rotation: DMat3::IDENTITY, translation: DVec3::new(0.0, 0.0, depth) };
+        for (x, y) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
+            for angle in [0.12, 0.24] {
+                let turn = Pose::from_twist(&[0.0, 0.0, 0.0, x * angle, y * angle, 0.0]);
+                let orbit = centre.compose(&turn).compose(&centre.inverse());
+                starts.push((last_pose.compose(&orbit), usize::MAX, last, *last_pose));
+                if lost {
+                    starts.push((last_pose.compose(&turn), usize::MAX, last, *last_pose));
+                }
+            }
+        }
+        if lost {
+            for i in self.alike(current, 6) {
+                let k = &self.keyframes[i];
+                starts.push((k.world_from_camera, usize::MAX, &k.pyramid, k.world_from_camera));
+            }
+        }
+        let mut found: Vec<(f64, Pose)> = Vec::new();
+        for (start, coarsest, pyramid, world_from_camera) in starts {
+            let reference = Reference { pyramid, world_from_camera, weight: 1.0 };
+            let fit = align_levels(&[reference], current, &start, &self.config.align, coarsest, 2)?;
+            let new = found.iter().all(|(_, other)| {
+                let d = other.inverse().compose(&fit.pose);
+                d.translation.length() / depth + d.angle_rad() > 0.01
+            });
+            if new {
+                found.push((fit.score, fit.pose));
+            }
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found.truncate(3);
+        Ok(found.into_iter().map(|(_, pose)| pose).collect())
+    }
+
+    /// Positions of the keyframes whose thumbnails resemble the frame's most.
+    fn alike(&self, current: &RgbdPyramid, most: usize) -> Vec<usize> {
         let thumbnail = Thumbnail::new(current);
         let mut alike: Vec<(f32, usize)> = self
             .keyframes
@@ -403,10 +491,8 @@ impl Odometer {
             .map(|(i, k)| (k.thumbnail.similarity(&thumbnail), i))
             .collect();
         alike.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
-        for &(_, i) in alike.iter().take(4) {
-            out.push((self.keyframes[i].world_from_camera, Some(i)));
-        }
-        out
+        alike.truncate(most);
+        alike.into_iter().map(|(_, i)| i).collect()
     }
 
     fn wants_keyframe(&self, fit: &Alignment, pose: &Pose, current: &RgbdPyramid) -> bool {
@@ -431,6 +517,7 @@ impl Odometer {
             world_from_camera: pose,
             pyramid: current.clone(),
             thumbnail: Thumbnail::new(current),
+            features: Features::new(current),
         });
         self.poses.insert(id, pose);
         if self.config.pose_graph {

@@ -48,6 +48,8 @@ pub(super) struct Sums {
     pub b: [f64; 8],
     /// Robust cost.
     pub cost: f64,
+    /// Robust cost with scales that do not depend on the data: compares poses.
+    pub fixed_cost: f64,
     /// Points tried.
     pub tried: u32,
     /// Points that fall into the reference image.
@@ -74,6 +76,7 @@ impl Sums {
             h: [[0.0; 8]; 8],
             b: [0.0; 8],
             cost: 0.0,
+            fixed_cost: 0.0,
             tried: 0,
             in_view: 0,
             geometric: 0,
@@ -94,6 +97,7 @@ impl Sums {
             self.b[i] += o.b[i];
         }
         self.cost += o.cost;
+        self.fixed_cost += o.fixed_cost;
         self.tried += o.tried;
         self.in_view += o.in_view;
         self.geometric += o.geometric;
@@ -180,6 +184,7 @@ fn evaluate_chunk(level: &Level, points: &[Point], m: &Model) -> Sums {
     let mut h = [[0.0f32; 8]; 8];
     let mut b = [0.0f32; 8];
     let mut cost = 0.0f32;
+    let mut fixed = 0.0f32;
     let mut geometric_square = [0.0f32; 2];
     let mut photometric_square = [0.0f32; 2];
     let (wi, he) = (level.width, level.height);
@@ -212,6 +217,7 @@ fn evaluate_chunk(level: &Level, points: &[Point], m: &Model) -> Sums {
         }
         if dz.abs() > m.gate * z {
             cost += 2.0 * outlier;
+            fixed += 1.5;
             continue;
         }
         let plane = level.planes[near];
@@ -228,6 +234,7 @@ fn evaluate_chunk(level: &Level, points: &[Point], m: &Model) -> Sums {
                 let raw = r * unit;
                 out.geometric_bins[bin(raw)] += 1;
                 out.geometric += 1;
+                fixed += (raw * raw * (1.0 / 16.0)).min(1.0);
                 let inv = 1.0 / m.geometric_scale;
                 let e = raw * inv;
                 let e2 = e * e;
@@ -245,6 +252,7 @@ fn evaluate_chunk(level: &Level, points: &[Point], m: &Model) -> Sums {
                 accumulate(&mut h, &mut b, &j, w, e);
             } else {
                 cost += outlier;
+                fixed += 1.0;
             }
         }
         if m.photometric_weight > 0.0 {
@@ -266,6 +274,7 @@ fn evaluate_chunk(level: &Level, points: &[Point], m: &Model) -> Sums {
             let unit = 1.0 / sqrt(spread);
             out.photometric_bins[bin(r * unit)] += 1;
             out.photometric += 1;
+            fixed += 0.5 * (r * r * 100.0).min(1.0);
             let inv = unit / m.photometric_sigma;
             let e = r * inv;
             let e2 = e * e;
@@ -290,6 +299,7 @@ fn evaluate_chunk(level: &Level, points: &[Point], m: &Model) -> Sums {
         out.b[i] = f64::from(b[i]);
     }
     out.cost = f64::from(cost);
+    out.fixed_cost = f64::from(fixed);
     out.geometric_square = geometric_square.map(f64::from);
     out.photometric_square = photometric_square.map(f64::from);
     out
