@@ -170,7 +170,8 @@ fn process(
         timings.push(Timing {
             frame: index,
             tracking_s: report.tracking_s,
-            mapping_s: report.mapping_s,
+            // Without mapping the core's clock still sees some nanoseconds.
+            mapping_s: if report.losses.is_some() { report.mapping_s } else { 0.0 },
             total_s: begin.elapsed().as_secs_f64(),
             status: status_name(report.status),
         });

@@ -9,7 +9,8 @@ use std::{
 pub struct Progress {
     what: &'static str,
     total: u64,
-    start: Instant,
+    /// When the first step was done: it often costs more than the others (first map, pipelines).
+    first: Option<(u64, Instant)>,
     shape: Shape,
 }
 
@@ -38,11 +39,12 @@ impl Progress {
         } else {
             Shape::Lines(0)
         };
-        Progress { what, total, start: Instant::now(), shape }
+        Progress { what, total, first: None, shape }
     }
 
     /// `done` of `total` is done; `message` tells how it goes.
     pub fn set(&mut self, done: u64, message: impl FnOnce() -> String) {
+        let (first, since) = *self.first.get_or_insert((done, Instant::now()));
         match &mut self.shape {
             Shape::Silent => {}
             Shape::Bar(bar) => {
@@ -53,15 +55,11 @@ impl Progress {
                 let tenth = done * 10 / self.total.max(1);
                 if tenth > *printed {
                     *printed = tenth;
-                    let rate = self.start.elapsed().div_f64(done.max(1) as f64);
+                    let rate = since.elapsed().div_f64((done - first).max(1) as f64);
                     let left = rate.mul_f64(self.total.saturating_sub(done) as f64);
-                    eprintln!(
-                        "{} {done}/{}  left {}  {}",
-                        self.what,
-                        self.total,
-                        clock(left),
-                        message()
-                    );
+                    let (what, total, message) = (self.what, self.total, message());
+                    let line = format!("{what} {done}/{total}  left {}  {message}", clock(left));
+                    eprintln!("{}", line.trim_end());
                 }
             }
         }

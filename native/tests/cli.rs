@@ -11,15 +11,17 @@ use tempfile::TempDir;
 const FRAMES: usize = 6;
 
 /// A run small enough for a test: coarse field, few rays, few iterations.
-const TINY: [&str; 24] = [
+const TINY: [&str; 26] = [
+    "--preset",
+    "fast",
     "--engine",
     "cpu",
     "--set",
-    "mapping.rays=128",
+    "mapping.rays=400",
     "--set",
-    "mapping.iterations=2",
+    "mapping.iterations=4",
     "--set",
-    "mapping.first_iterations=10",
+    "mapping.first_iterations=60",
     "--set",
     "mapping.final_iterations=2",
     "--set",

@@ -65,7 +65,7 @@ pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
     let mut device = set_up(chosen.engine, &config)?;
     let tracking = measure(&mut device, &config, Kind::Tracking, args.iterations, screen)?;
     let mapping = measure(&mut device, &config, Kind::Mapping, args.iterations, screen)?;
-    let align_ms = measure_align(&mut device, &config, args.iterations)?;
+    let (points, align_ms) = measure_align(&mut device, &config, args.iterations)?;
     let bytes = device.engine.allocated_bytes();
 
     let mut text = format!(
@@ -80,7 +80,6 @@ pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
     );
     describe(&mut text, "tracking (render)", &tracking);
     describe(&mut text, "mapping", &mapping);
-    let points = config.tracking.align_pixels;
     let _ = writeln!(
         text,
         "\ntracking (align), {points} points: {align_ms:.2} ms an iteration, with reading back"
@@ -253,7 +252,7 @@ fn measure(
 }
 
 /// One Gauss-Newton iteration against the field: sums of the normal equations, read back.
-fn measure_align(device: &mut Device, config: &Config, iterations: usize) -> Result<f64> {
+fn measure_align(device: &mut Device, config: &Config, iterations: usize) -> Result<(usize, f64)> {
     let frame = box_frame(&Pose::IDENTITY);
     let step = CAMERA.pixels().div_ceil(config.tracking.align_pixels as usize);
     let points: Vec<[f32; 4]> = (0..CAMERA.pixels())
@@ -273,7 +272,7 @@ fn measure_align(device: &mut Device, config: &Config, iterations: usize) -> Res
     for _ in 0..iterations {
         block_on(device.align(&Pose::IDENTITY, points.len() as u32))?;
     }
-    Ok(ms_since(begin) / iterations as f64)
+    Ok((points.len(), ms_since(begin) / iterations as f64))
 }
 
 fn ms_since(begin: Instant) -> f64 {

@@ -211,11 +211,19 @@ impl Metrics {
         }
         row("lost frames", lost_text(&self.lost_frames), "");
         let name_width = rows.iter().map(|r| r.0.len()).max().unwrap_or(0);
-        let value_width = rows.iter().map(|r| r.1.len()).max().unwrap_or(0);
         let mut text = String::new();
+        // Protocols are long: numbered, and listed below the figures they belong to.
+        let mut protocols = Vec::new();
         for (name, value, protocol) in rows {
-            let line = format!("{name:name_width$}  {value:value_width$}  {protocol}");
+            let mut line = format!("{name:name_width$}  {value:26}");
+            if !protocol.is_empty() {
+                protocols.push(protocol);
+                line += &format!("  [{}]", protocols.len());
+            }
             let _ = writeln!(text, "{}", line.trim_end());
+        }
+        for (i, protocol) in protocols.iter().enumerate() {
+            let _ = writeln!(text, "{}", wrapped(&format!("[{}] {protocol}", i + 1)));
         }
         for warning in &self.warnings {
             let _ = writeln!(text, "note: {warning}");
@@ -225,6 +233,25 @@ impl Metrics {
         }
         text
     }
+}
+
+/// Lines of at most 96 characters; later ones indented.
+fn wrapped(text: &str) -> String {
+    let mut lines = String::new();
+    let mut length = 0;
+    for word in text.split(' ') {
+        if length > 0 && length + 1 + word.len() > 96 {
+            lines += "\n   ";
+            length = 3;
+        }
+        if length > 0 {
+            lines.push(' ');
+            length += 1;
+        }
+        lines += word;
+        length += word.len();
+    }
+    lines
 }
 
 fn depth_detail(d: &DepthReport) -> String {

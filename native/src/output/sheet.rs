@@ -15,6 +15,8 @@ const PAPER: [u8; 3] = [24, 26, 30];
 const INK: [u8; 3] = [235, 235, 235];
 const FAINT: [u8; 3] = [150, 155, 165];
 const GAP: usize = 8;
+/// Where there is no depth: no colour of the map has equal parts.
+const NO_DEPTH: [u8; 3] = [90; 3];
 /// Colour error at the top of its scale, of 255.
 const COLOR_ERROR: f64 = 64.0;
 /// Depth error at the top of its scale \[m\].
@@ -74,11 +76,11 @@ pub fn sheet(
     let image: Vec<_> = error.iter().map(|e| turbo(e / COLOR_ERROR)).collect();
     panel(0, 2, "absolute colour error", &image);
 
-    // Depth; black where there is no measurement or nothing rendered.
+    // Depth; grey where there is no measurement or nothing rendered.
     let input: Vec<f64> = frame.depth.iter().map(|&d| f64::from(d) * depth_unit_m).collect();
     let rendered: Vec<f64> = view.depth_m.iter().map(|&d| f64::from(d)).collect();
     let (near, far) = depth_range(&input).or(depth_range(&rendered)).unwrap_or((0.0, 1.0));
-    let shade = |d: &f64| if *d > 0.0 { turbo((d - near) / (far - near)) } else { [0; 3] };
+    let shade = |d: &f64| if *d > 0.0 { turbo((d - near) / (far - near)) } else { NO_DEPTH };
     panel(1, 0, "input depth", &input.iter().map(shade).collect::<Vec<_>>());
     panel(1, 1, "rendered depth (unguided)", &rendered.iter().map(shade).collect::<Vec<_>>());
     let both: Vec<Option<f64>> = input
@@ -89,7 +91,7 @@ pub fn sheet(
     let count = both.iter().flatten().count().max(1) as f64;
     let l1 = 100.0 * both.iter().flatten().sum::<f64>() / count;
     let image: Vec<_> =
-        both.iter().map(|e| e.map_or([0; 3], |e| turbo(e / DEPTH_ERROR_M))).collect();
+        both.iter().map(|e| e.map_or(NO_DEPTH, |e| turbo(e / DEPTH_ERROR_M))).collect();
     panel(1, 2, &format!("depth error  L1 {l1:.2} cm"), &image);
 
     if with_classes {
