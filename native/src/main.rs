@@ -1,6 +1,44 @@
-//! The command line.
-// Used by the commands once they are there.
-#[cfg(test)]
+//! The command line of MTE-SLAM. Exit codes: 0 done, 1 something failed while working, 2 the
+//! command line or configuration is wrong.
+mod args;
+mod commands;
+mod configuration;
+mod engine;
+mod errors;
+mod evaluation;
+mod input;
+mod memory;
+mod output;
+mod pipeline;
+mod progress;
+mod record;
+mod screen;
 mod source;
 
-fn main() {}
+use args::{Cli, Command};
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let screen = screen::Screen { quiet: cli.quiet, json: cli.json };
+    let done = match &cli.command {
+        Command::Demo(args) => commands::demo::run(args, screen),
+        Command::Run(args) => commands::run::run(args, screen),
+        Command::Eval(args) => commands::eval::run(args, screen),
+        Command::Mesh(args) => commands::mesh::run(args, screen),
+        Command::Render(args) => commands::render::run(args, screen),
+        Command::Synth(args) => commands::synth::run(args, screen),
+        Command::Info(args) => commands::info::run(args, screen),
+        Command::Bench(args) => commands::bench::run(args, screen),
+        Command::Shaders(args) => commands::shaders::run(args, screen),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            let usage = error.downcast_ref::<errors::UsageError>().is_some();
+            ExitCode::from(if usage { 2 } else { 1 })
+        }
+    }
+}

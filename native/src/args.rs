@@ -1,0 +1,385 @@
+//! The command line as clap reads it. The texts here are the program's manual, so they teach:
+//! what a command does, what it writes, and an example to copy.
+use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
+use std::path::PathBuf;
+
+/// Neural RGB-D semantic SLAM on any GPU, or none.
+#[derive(Debug, Parser)]
+#[command(
+    name = "mte-slam",
+    version,
+    arg_required_else_help = true,
+    about = "Neural RGB-D semantic SLAM on any GPU, or none",
+    long_about = "Neural RGB-D semantic SLAM on any GPU, or none.\n\n\
+        A recording of colour and depth images goes in; the camera's path, a coloured mesh (with \
+        classes where there are labels), pictures rendered from the map and metrics come out.\n\n\
+        Start with the built-in sequence, which needs no data:\n\n    \
+        mte-slam demo\n\n\
+        then with your own recording (Replica, TUM RGB-D or 7-Scenes layout):\n\n    \
+        mte-slam run path/to/recording --out out/mine\n    \
+        mte-slam mesh out/mine --resolution 0.01",
+    after_help = "Exit codes: 0 done, 1 something failed while working, 2 the command line or \
+        configuration is wrong."
+)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+    /// Print nothing but errors (and, with --json, the figures).
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+    /// Print the figures as JSON on stdout and nothing else there; progress stays on stderr.
+    #[arg(long, global = true)]
+    pub json: bool,
+}
+
+/// The subcommands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run the built-in sequence: a furnished room, with labels and a true mesh
+    #[command(
+        long_about = "Run SLAM on the built-in sequence, a procedurally made furnished room with \
+        labels and a true mesh, and write trajectory, metrics, mesh and pictures. Needs no data, no \
+        network and no GPU (without one it says so and computes on the processor).\n\nExamples:\n    \
+        mte-slam demo\n    \
+        mte-slam demo --frames 20 --engine cpu --out out/quick"
+    )]
+    Demo(DemoArgs),
+    /// Run SLAM on a recording and write trajectory, metrics, mesh and pictures
+    #[command(
+        long_about = "Run SLAM on a recording. The layout is recognised by the files there: Replica \
+        (NICE-SLAM or vMAP render), TUM RGB-D, 7-Scenes.\n\n\
+        The output folder receives:\n    \
+        trajectory.txt       time stamp, position [m] and quaternion of world_from_camera (TUM format)\n    \
+        trajectory_gt.txt    the same of the ground truth, where known\n    \
+        trajectory.svg       both, from above and from the side\n    \
+        metrics.json         every figure with its protocol\n    \
+        timings.csv          seconds of each frame\n    \
+        config.toml          the complete effective configuration; --config takes it back\n    \
+        mesh.ply, mesh.glb, mesh_semantic.ply\n    \
+        renders/             colour, depth [mm], classes and a comparison sheet of every K-th frame\n    \
+        checkpoint.safetensors   the map; `mesh` and `render` read it\n\n\
+        Examples:\n    \
+        mte-slam run data/room0\n    \
+        mte-slam run data/rgbd_dataset_freiburg1_desk --preset tum --scale 0.5\n    \
+        mte-slam run data/room0 --frames 100 --set mapping.iterations=20 --seed 7 --out out/try"
+    )]
+    Run(RunArgs),
+    /// Compute the figures of an output folder again, from its files and the recording alone
+    #[command(
+        long_about = "Compute the figures of an output folder again, from trajectory.txt, renders/ \
+        and mesh.ply and the recording they came from; no engine is started. Writes OUT/eval.json \
+        and prints the table. Works for files of other programs too, if they follow the same \
+        formats.\n\nExample:\n    mte-slam eval out/room0-replica data/room0 --mesh data/room0_mesh.ply"
+    )]
+    Eval(EvalArgs),
+    /// Extract the mesh of an output folder's map again, for example finer
+    #[command(
+        long_about = "Extract the mesh of an output folder's checkpoint again, at any resolution, \
+        and replace OUT/mesh.ply, mesh.glb and (with classes) mesh_semantic.ply.\n\n\
+        Example:\n    mte-slam mesh out/room0-replica --resolution 0.01"
+    )]
+    Mesh(MeshArgs),
+    /// Render colour, depth and classes of an output folder's map at a frame's pose
+    #[command(
+        long_about = "Render colour, depth and classes from an output folder's checkpoint at the \
+        estimated pose of one frame, without any depth input, into OUT/renders.\n\n\
+        Example:\n    mte-slam render out/room0-replica --frame 42"
+    )]
+    Render(RenderArgs),
+    /// Write the built-in sequence to a folder, in Replica layout
+    #[command(
+        long_about = "Write the built-in sequence to a folder in Replica (NICE-SLAM) layout with \
+        labels, camera, bounds, class list and true mesh.\n\n\
+        Example:\n    mte-slam synth data/room --frames 200 && mte-slam run data/room"
+    )]
+    Synth(SynthArgs),
+    /// List adapters, their limits, and which engine `auto` would take
+    Info(InfoArgs),
+    /// Measure the kernels: milliseconds per stage and per iteration
+    #[command(
+        long_about = "Measure tracking (2000 rays of 40 samples) and mapping (4000 rays of 40 \
+        samples) iterations with three modalities, 16 channels and 52 classes in a bound of 5.3 x \
+        2.9 x 2.9 m: milliseconds per stage and per iteration, after a warm-up.\n\n\
+        Examples:\n    mte-slam bench\n    mte-slam bench --engine cpu --iterations 5"
+    )]
+    Bench(BenchArgs),
+    /// Write every composed shader to a folder, for reading
+    Shaders(ShadersArgs),
+}
+
+/// Which engine computes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum EngineChoice {
+    /// A graphics adapter if there is one, else the processor.
+    #[default]
+    Auto,
+    /// A graphics adapter (Vulkan, Metal or DirectX 12); an error without one.
+    Gpu,
+    /// The processor: the kernels' Rust twins on all cores.
+    Cpu,
+}
+
+/// Engine options.
+#[derive(Clone, Debug, Default, Args)]
+pub struct EngineArgs {
+    /// What computes.
+    #[arg(long, value_enum, default_value_t, value_name = "ENGINE", help_heading = "Engine")]
+    pub engine: EngineChoice,
+    /// Take the adapter whose name contains this text (see `mte-slam info`).
+    #[arg(long, value_name = "NAME", help_heading = "Engine")]
+    pub adapter: Option<String>,
+}
+
+/// How poses are tracked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TrackerChoice {
+    /// Align points with the field's surface and colour (Gauss-Newton); the default of the presets.
+    Align,
+    /// Volume rendering and Adam, as in the paper.
+    Render,
+    /// Take the true poses: mapping alone.
+    Truth,
+}
+
+/// Where the configuration comes from. Later ones win: preset, file, `--set`, the named flags.
+#[derive(Clone, Debug, Default, Args)]
+pub struct ConfigArgs {
+    /// Configuration file (TOML): keys given there replace the preset's. A config.toml of an
+    /// output folder repeats that run.
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, help_heading = "Configuration")]
+    pub config: Option<PathBuf>,
+    /// Settings to start from: fast, replica, scannet or tum [default: by layout; demo: fast].
+    #[arg(long, value_name = "PRESET", help_heading = "Configuration")]
+    pub preset: Option<String>,
+    /// Set one key, for example `mapping.iterations=30`; may be repeated. config.toml of any
+    /// output folder lists all keys.
+    #[arg(long = "set", value_name = "KEY=VALUE", help_heading = "Configuration")]
+    pub set: Vec<String>,
+    /// How poses are tracked [default: by preset].
+    #[arg(long, value_enum, value_name = "TRACKER", help_heading = "Configuration")]
+    pub tracker: Option<TrackerChoice>,
+    /// Seed of every random choice; one seed on one adapter gives identical files.
+    #[arg(long, value_name = "S", help_heading = "Configuration")]
+    pub seed: Option<u32>,
+}
+
+/// What is written where.
+#[derive(Clone, Debug, Args)]
+pub struct OutputArgs {
+    /// Output folder [default: out/<dataset>-<preset>].
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath, help_heading = "Output")]
+    pub out: Option<PathBuf>,
+    /// Write into a folder that holds other files (they stay).
+    #[arg(long, help_heading = "Output")]
+    pub force: bool,
+    /// Render and evaluate every K-th frame; 0 renders none.
+    #[arg(long, value_name = "K", default_value_t = 10, help_heading = "Output")]
+    pub render_every: usize,
+    /// Voxel size of the mesh in metres; `mte-slam mesh` can refine it later [default: by preset].
+    #[arg(long, value_name = "M", value_parser = positive_metres, help_heading = "Output")]
+    pub mesh_resolution: Option<f64>,
+    /// Do not extract a mesh.
+    #[arg(long, help_heading = "Output")]
+    pub no_mesh: bool,
+}
+
+/// `run`.
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// Folder of the recording.
+    #[arg(value_name = "DATASET", value_hint = ValueHint::DirPath)]
+    pub dataset: PathBuf,
+    /// Which part of the recording, and how it is read.
+    #[command(flatten)]
+    pub selection: SelectionArgs,
+    /// Ground-truth mesh to compare with [default: mesh.ply in the recording's folder, if there].
+    #[arg(long, value_name = "GT.ply", value_hint = ValueHint::FilePath, help_heading = "Output")]
+    pub mesh: Option<PathBuf>,
+    /// Configuration.
+    #[command(flatten)]
+    pub config: ConfigArgs,
+    /// Engine.
+    #[command(flatten)]
+    pub engine: EngineArgs,
+    /// Output.
+    #[command(flatten)]
+    pub output: OutputArgs,
+}
+
+/// Which part of a recording, and how it is read.
+#[derive(Clone, Debug, Args)]
+pub struct SelectionArgs {
+    /// Layout of the files, instead of recognising it: replica, replica-vmap, tum, 7scenes.
+    #[arg(long, value_name = "LAYOUT", help_heading = "Recording")]
+    pub layout: Option<String>,
+    /// Take at most N frames [default: all].
+    #[arg(long, value_name = "N", value_parser = at_least_one, help_heading = "Recording")]
+    pub frames: Option<usize>,
+    /// Take every K-th frame.
+    #[arg(long, value_name = "K", default_value = "1", value_parser = at_least_one, help_heading = "Recording")]
+    pub stride: usize,
+    /// Skip the first I frames.
+    #[arg(long, value_name = "I", default_value_t = 0, help_heading = "Recording")]
+    pub start: usize,
+    /// Scale the images, for example 0.5 for half the width and height.
+    #[arg(long, value_name = "F", default_value = "1", value_parser = image_scale, help_heading = "Recording")]
+    pub scale: f64,
+    /// Labels: `none`, `dataset` (those of the recording, if any), or a folder of label images.
+    #[arg(
+        long,
+        value_name = "none|dataset|DIR",
+        default_value = "dataset",
+        help_heading = "Recording"
+    )]
+    pub labels: String,
+}
+
+/// `demo`.
+#[derive(Debug, Args)]
+pub struct DemoArgs {
+    /// Number of frames of the built-in sequence.
+    #[arg(long, value_name = "N", default_value = "60", value_parser = at_least_one, help_heading = "Recording")]
+    pub frames: usize,
+    /// Image width in pixels; the height is three quarters of it.
+    #[arg(long, value_name = "PIXELS", default_value = "160", value_parser = picture_width, help_heading = "Recording")]
+    pub width: u32,
+    /// Configuration.
+    #[command(flatten)]
+    pub config: ConfigArgs,
+    /// Engine.
+    #[command(flatten)]
+    pub engine: EngineArgs,
+    /// Output.
+    #[command(flatten)]
+    pub output: OutputArgs,
+}
+
+/// `eval`.
+#[derive(Debug, Args)]
+pub struct EvalArgs {
+    /// Output folder of a run.
+    #[arg(value_name = "OUT", value_hint = ValueHint::DirPath)]
+    pub out: PathBuf,
+    /// The recording it came from.
+    #[arg(value_name = "DATASET", value_hint = ValueHint::DirPath)]
+    pub dataset: PathBuf,
+    /// Ground-truth mesh to compare with [default: mesh.ply in the recording's folder, if there].
+    #[arg(long, value_name = "GT.ply", value_hint = ValueHint::FilePath)]
+    pub mesh: Option<PathBuf>,
+    /// Layout of the recording's files, instead of recognising it.
+    #[arg(long, value_name = "LAYOUT")]
+    pub layout: Option<String>,
+    /// Which parts of the two meshes are compared.
+    #[arg(long, value_enum, default_value_t, value_name = "PROTOCOL")]
+    pub cull: CullChoice,
+    /// Align our mesh to the true one first (point-to-point ICP, 0.1 m), as the peers do.
+    #[arg(long)]
+    pub icp: bool,
+    /// Labels to compare with: `dataset` or a folder of label images.
+    #[arg(long, value_name = "dataset|DIR", default_value = "dataset")]
+    pub labels: String,
+}
+
+/// Which parts of a mesh count as observed; both meshes are culled alike.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum CullChoice {
+    /// In a frame, and no deeper than its measured depth plus 6 cm (ESLAM).
+    #[default]
+    Eslam,
+    /// In a frame's frustum, and not hidden by the mesh itself by more than 3 cm (Co-SLAM).
+    Coslam,
+}
+
+/// `mesh`.
+#[derive(Debug, Args)]
+pub struct MeshArgs {
+    /// Output folder of a run.
+    #[arg(value_name = "OUT", value_hint = ValueHint::DirPath)]
+    pub out: PathBuf,
+    /// Voxel size in metres.
+    #[arg(long, value_name = "M", default_value_t = 0.01, value_parser = positive_metres)]
+    pub resolution: f64,
+    /// Engine.
+    #[command(flatten)]
+    pub engine: EngineArgs,
+}
+
+/// `render`.
+#[derive(Debug, Args)]
+pub struct RenderArgs {
+    /// Output folder of a run.
+    #[arg(value_name = "OUT", value_hint = ValueHint::DirPath)]
+    pub out: PathBuf,
+    /// Frame whose estimated pose is taken (counted from 0, as the pictures are named).
+    #[arg(long, value_name = "I")]
+    pub frame: usize,
+    /// Engine.
+    #[command(flatten)]
+    pub engine: EngineArgs,
+}
+
+/// `synth`.
+#[derive(Debug, Args)]
+pub struct SynthArgs {
+    /// Folder to write to; must be empty or absent.
+    #[arg(value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub dir: PathBuf,
+    /// Number of frames.
+    #[arg(long, value_name = "N", default_value = "200", value_parser = at_least_one)]
+    pub frames: usize,
+    /// Image width in pixels; the height is three quarters of it.
+    #[arg(long, value_name = "PIXELS", default_value = "320", value_parser = picture_width)]
+    pub width: u32,
+}
+
+/// `info`.
+#[derive(Debug, Args)]
+pub struct InfoArgs {}
+
+/// `bench`.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// Iterations to average over.
+    #[arg(long, value_name = "N", default_value = "10", value_parser = at_least_one)]
+    pub iterations: usize,
+    /// Engine.
+    #[command(flatten)]
+    pub engine: EngineArgs,
+}
+
+/// `shaders`.
+#[derive(Debug, Args)]
+pub struct ShadersArgs {
+    /// Folder to write to.
+    #[arg(value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub dir: PathBuf,
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(n) if n >= 1 => Ok(n),
+        _ => Err("found no whole number of at least 1, expected for example 10".to_owned()),
+    }
+}
+
+fn picture_width(text: &str) -> Result<u32, String> {
+    match text.parse::<u32>() {
+        Ok(n) if (32..=1280).contains(&n) && n % 4 == 0 => Ok(n),
+        _ => Err("expected a multiple of 4 from 32 to 1280".to_owned()),
+    }
+}
+
+fn positive_metres(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(m) if (0.001..=1.0).contains(&m) => Ok(m),
+        _ => Err("expected metres from 0.001 to 1".to_owned()),
+    }
+}
+
+fn image_scale(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(f) if f.is_finite() && f > 0.0 && f <= 1.0 => Ok(f),
+        _ => Err("expected a factor above 0 and at most 1, for example 0.5".to_owned()),
+    }
+}

@@ -1,0 +1,280 @@
+//! `mte-slam bench`: what one optimisation iteration costs, and which kernel how much of it.
+//!
+//! The scene is the inside of a box as large as the bound, so that every ray meets a surface in
+//! the map; its content does not change the work. Whole iterations are timed as a run submits
+//! them, several in a row with one wait at the end; kernels are timed one by one with a wait
+//! after each, so their sum holds the waits and is above the whole.
+use crate::{args::BenchArgs, engine, screen::Screen};
+use anyhow::{Context, Result};
+use glam::DVec3;
+use mte_slam_core::{
+    camera::Camera,
+    config::Config,
+    device::{Batch, Device, Rates},
+    engine::Engine,
+    field::FieldShape,
+    frame::{Bounds, Frame},
+    kernels::shared::{FLAG_GUIDED, FLAG_MAP, FLAG_MASK, FLAG_POSE},
+    pose::Pose,
+    recording::{Command, Recording},
+};
+use pollster::block_on;
+use serde::Serialize;
+use std::{fmt::Write, time::Instant};
+
+/// Size of the scene \[m\].
+const SIZE_M: DVec3 = DVec3::new(5.3, 2.9, 2.9);
+const CLASSES: u32 = 52;
+const CAMERA: Camera =
+    Camera { width: 320, height: 240, fx: 200.0, fy: 200.0, cx: 159.5, cy: 119.5 };
+const DEPTH_UNIT_M: f64 = 0.001;
+/// Frames of the mapping window.
+const WINDOW: u32 = 5;
+/// Slots 1..=WINDOW hold the window; slot 0 has no images.
+const FIRST_SLOT: u32 = 1;
+
+#[derive(Serialize)]
+struct Stage {
+    kernel: String,
+    ms: f64,
+    dispatches: usize,
+}
+
+#[derive(Serialize)]
+struct Measured {
+    rays: u32,
+    samples_a_ray: u32,
+    ms_an_iteration: f64,
+    stages: Vec<Stage>,
+}
+
+/// Which iteration.
+#[derive(Clone, Copy)]
+enum Kind {
+    Tracking,
+    Mapping,
+}
+
+/// Measure.
+pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
+    let chosen = engine::start(&args.engine)?;
+    screen.note(&chosen.note);
+    let mut config = Config::preset("replica").context("there is no preset `replica`")?;
+    (config.mapping.rays, config.tracking.render_rays) = (4000, 2000);
+    (config.sampling.stratified, config.sampling.surface) = (32, 8);
+    let mut device = set_up(chosen.engine, &config)?;
+    let tracking = measure(&mut device, &config, Kind::Tracking, args.iterations, screen)?;
+    let mapping = measure(&mut device, &config, Kind::Mapping, args.iterations, screen)?;
+    let (points, align_ms) = measure_align(&mut device, &config, args.iterations)?;
+    let bytes = device.engine.allocated_bytes();
+
+    let mut text = format!(
+        "{}\nbound {} x {} x {} m, three modalities of 16 channels, {CLASSES} classes, {} MiB of \
+         buffers; mean of {} iterations\n",
+        chosen.note,
+        SIZE_M.x,
+        SIZE_M.y,
+        SIZE_M.z,
+        bytes >> 20,
+        args.iterations
+    );
+    describe(&mut text, "tracking (render)", &tracking);
+    describe(&mut text, "mapping", &mapping);
+    let _ = writeln!(
+        text,
+        "\ntracking (align), {points} points: {align_ms:.2} ms an iteration, with reading back"
+    );
+    let json = serde_json::json!({
+        "engine": chosen.record,
+        "iterations": args.iterations,
+        "device_bytes": bytes,
+        "tracking_render": tracking,
+        "mapping": mapping,
+        "tracking_align": { "points": points, "ms_an_iteration": align_ms },
+    });
+    screen.result(&text, &format!("{json:#}\n"));
+    Ok(())
+}
+
+fn describe(text: &mut String, name: &str, m: &Measured) {
+    let (rays, samples) = (m.rays, m.samples_a_ray);
+    let _ =
+        writeln!(text, "\n{name}, {rays} x {samples}: {:.2} ms an iteration", m.ms_an_iteration);
+    let sum: f64 = m.stages.iter().map(|s| s.ms).sum();
+    for s in &m.stages {
+        let _ = writeln!(text, "  {:22}{:9.2} ms {:5.1} %", s.kernel, s.ms, 100.0 * s.ms / sum);
+    }
+}
+
+fn set_up(engine: Engine, config: &Config) -> Result<Device> {
+    let bounds = Bounds { min: SIZE_M * -0.5, max: SIZE_M * 0.5 };
+    let shape = FieldShape::new(bounds, &config.field);
+    let mut device = Device::new(engine, config, CAMERA, DEPTH_UNIT_M, CLASSES, shape)
+        .context("the benchmark's map cannot be set up")?;
+    let mut r = Recording::default();
+    for k in 0..WINDOW {
+        let pose = Pose::from_twist(&[0.1 * f64::from(k), 0.0, 0.0, 0.0, 0.3 * f64::from(k), 0.0]);
+        device.upload_frame(&mut r, FIRST_SLOT + k, &box_frame(&pose));
+        device.upload_pose(&mut r, FIRST_SLOT + k, &pose);
+    }
+    device.engine.submit(&r)?;
+    Ok(device)
+}
+
+/// A view of the box's inside from `pose`: checkers of colour and class.
+fn box_frame(pose: &Pose) -> Frame {
+    let half = SIZE_M * 0.45;
+    let pixels = (0..CAMERA.height).flat_map(|v| (0..CAMERA.width).map(move |u| (u, v)));
+    let mut frame = Frame {
+        index: 0,
+        number: 0,
+        time_s: 0.0,
+        color: Vec::with_capacity(CAMERA.pixels()),
+        depth: Vec::with_capacity(CAMERA.pixels()),
+        labels: None,
+        truth: Some(*pose),
+    };
+    let mut labels = Vec::with_capacity(CAMERA.pixels());
+    for (u, v) in pixels {
+        let ray = pose.transform_vector(CAMERA.back_project(f64::from(u), f64::from(v), 1.0));
+        let exit = |k: usize| (half[k].copysign(ray[k]) - pose.translation[k]) / ray[k];
+        let depth_m = (0..3).map(exit).filter(|d| d.is_finite()).fold(f64::INFINITY, f64::min);
+        let cell = ((pose.translation + ray * depth_m) * 2.0).floor();
+        let n = (cell.x * 7.0 + cell.y * 3.0 + cell.z * 5.0).rem_euclid(f64::from(CLASSES)) as u8;
+        frame.color.push([n * 4, 255 - n * 4, 128]);
+        frame.depth.push((depth_m / DEPTH_UNIT_M) as u16);
+        labels.push(n);
+    }
+    frame.labels = Some(labels);
+    frame
+}
+
+fn record(
+    device: &mut Device,
+    config: &Config,
+    kind: Kind,
+    iteration: u32,
+    r: &mut Recording,
+) -> (u32, u32) {
+    let s = &config.sampling;
+    let (frames, rays, flags, loss) = match kind {
+        Kind::Tracking => {
+            let flags = FLAG_GUIDED | FLAG_POSE | FLAG_MASK;
+            (1, config.tracking.render_rays, flags, &config.tracking.render_loss)
+        }
+        Kind::Mapping => {
+            let flags = FLAG_GUIDED | FLAG_POSE | FLAG_MAP;
+            (WINDOW, config.mapping.rays, flags, &config.loss)
+        }
+    };
+    let batch = Batch {
+        frames,
+        rays_per_frame: rays / frames,
+        stratified: s.stratified,
+        surface: s.surface,
+        flags,
+        loss,
+        iteration,
+        first: 0,
+    };
+    device.record_forward(r, &batch);
+    device.record_backward(r, &batch);
+    let m = &config.mapping;
+    device.record_pose_step(r, &batch, m.rate_translation_m, m.rate_rotation_rad, iteration == 0);
+    if let Kind::Mapping = kind {
+        let rates = Rates { planes: m.rate_planes, decoders: m.rate_decoders };
+        device.record_step(r, &batch, rates);
+    }
+    (rays, s.stratified + s.surface)
+}
+
+fn measure(
+    device: &mut Device,
+    config: &Config,
+    kind: Kind,
+    iterations: usize,
+    screen: Screen,
+) -> Result<Measured> {
+    let name = match kind {
+        Kind::Tracking => "tracking",
+        Kind::Mapping => "mapping",
+    };
+    let mut progress = screen.progress(name, 2 * iterations);
+    let window: Vec<(u32, bool)> = (FIRST_SLOT..FIRST_SLOT + WINDOW)
+        .map(|slot| (slot, matches!(kind, Kind::Mapping) && slot == FIRST_SLOT))
+        .collect();
+    let mut r = Recording::default();
+    device.upload_window(&mut r, &window);
+    // Warm up: pipelines are compiled on first use.
+    let (rays, samples_a_ray) = record(device, config, kind, 0, &mut r);
+    device.engine.submit(&r)?;
+    block_on(device.engine.synchronise())?;
+
+    let begin = Instant::now();
+    let mut r = Recording::default();
+    for i in 0..iterations {
+        record(device, config, kind, i as u32 + 1, &mut r);
+        // As a run does: a few iterations a submission.
+        if i % 4 == 3 || i + 1 == iterations {
+            device.engine.submit(&std::mem::take(&mut r))?;
+        }
+    }
+    block_on(device.engine.synchronise())?;
+    let ms_an_iteration = ms_since(begin) / iterations as f64;
+    progress.set(iterations as u64, String::new);
+
+    let mut stages: Vec<Stage> = Vec::new();
+    for i in 0..iterations {
+        let mut r = Recording::default();
+        record(device, config, kind, (iterations + i) as u32 + 1, &mut r);
+        for command in r.commands {
+            let Command::Dispatch { kernel, .. } = &command else {
+                device.engine.submit(&Recording { commands: vec![command] })?;
+                continue;
+            };
+            let kernel = kernel.name;
+            let begin = Instant::now();
+            device.engine.submit(&Recording { commands: vec![command] })?;
+            block_on(device.engine.synchronise())?;
+            let ms = ms_since(begin) / iterations as f64;
+            match stages.iter_mut().find(|s| s.kernel == kernel) {
+                Some(stage) => {
+                    stage.ms += ms;
+                    stage.dispatches += usize::from(i == 0);
+                }
+                None => stages.push(Stage { kernel: kernel.to_owned(), ms, dispatches: 1 }),
+            }
+        }
+        progress.set((iterations + i) as u64 + 1, String::new);
+    }
+    progress.finish();
+    Ok(Measured { rays, samples_a_ray, ms_an_iteration, stages })
+}
+
+/// One Gauss-Newton iteration against the field: sums of the normal equations, read back.
+fn measure_align(device: &mut Device, config: &Config, iterations: usize) -> Result<(usize, f64)> {
+    let frame = box_frame(&Pose::IDENTITY);
+    let step = CAMERA.pixels().div_ceil(config.tracking.align_pixels as usize);
+    let points: Vec<[f32; 4]> = (0..CAMERA.pixels())
+        .step_by(step)
+        .map(|i| {
+            let (u, v) = (i as u32 % CAMERA.width, i as u32 / CAMERA.width);
+            let depth_m = f64::from(frame.depth[i]) * DEPTH_UNIT_M;
+            let p = CAMERA.back_project(f64::from(u), f64::from(v), depth_m);
+            [p.x as f32, p.y as f32, p.z as f32, f32::from(frame.color[i][0]) / 255.0]
+        })
+        .collect();
+    let mut r = Recording::default();
+    device.upload_pixels(&mut r, &points);
+    device.engine.submit(&r)?;
+    block_on(device.align(&Pose::IDENTITY, points.len() as u32))?;
+    let begin = Instant::now();
+    for _ in 0..iterations {
+        block_on(device.align(&Pose::IDENTITY, points.len() as u32))?;
+    }
+    Ok((points.len(), ms_since(begin) / iterations as f64))
+}
+
+fn ms_since(begin: Instant) -> f64 {
+    begin.elapsed().as_secs_f64() * 1000.0
+}

@@ -1,0 +1,209 @@
+//! `mte-slam eval`: the figures again, from files alone.
+use crate::{
+    args::{CullChoice, EvalArgs, SelectionArgs},
+    evaluation::{self, MeshTruth, ViewScores},
+    input,
+    output::{folder::replace_file, metrics::Metrics, trajectory::read_tum},
+    pipeline::sequence_record,
+    record::{self, RunRecord},
+    screen::Screen,
+};
+use anyhow::{Context, Result, bail};
+use image::{ColorType, DynamicImage};
+use mte_slam_core::{
+    classes::{ClassTable, UNLABELLED},
+    frame::SequenceInfo,
+    mesh::read_ply,
+    metrics::PosePair,
+    pose::Pose,
+    sequence::Sequence,
+    slam::View,
+};
+use std::path::Path;
+
+/// Time stamps that differ by less name the same frame \[s\].
+const SAME_STAMP_S: f64 = 1e-5;
+
+/// Evaluate an output folder.
+pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
+    let out = &args.out;
+    if !out.is_dir() {
+        bail!(
+            "{}: found no folder of that name, expected the output folder of a run",
+            out.display()
+        );
+    }
+    let record = record::read_run(out)?.unwrap_or_default();
+    let selection = SelectionArgs {
+        layout: args.layout.clone(),
+        frames: (record.frames > 0).then_some(record.frames),
+        stride: record.stride,
+        start: record.start,
+        scale: record.scale,
+        labels: args.labels.clone(),
+    };
+    let mut sequence = input::open(&args.dataset, &selection, screen)?;
+    let info = sequence.info().clone();
+    let truth_mesh = MeshTruth::find(args.mesh.as_deref(), &args.dataset)?;
+    let record = RunRecord { labels: args.labels.clone(), ..record };
+    let mut metrics = Metrics {
+        program: format!("mte-slam {} eval", env!("CARGO_PKG_VERSION")),
+        sequence: sequence_record(&info, &record),
+        lost_frames: lost_frames(&out.join("timings.csv")),
+        ..Metrics::default()
+    };
+    evaluate_trajectory(out, sequence.as_ref(), &mut metrics)?;
+    evaluate_renders(out, sequence.as_mut(), screen, &mut metrics)?;
+    let path = out.join("mesh.ply");
+    match truth_mesh {
+        Err(reason) => {
+            metrics.absent.insert("mesh", reason);
+        }
+        Ok(_) if !path.is_file() => {
+            metrics.absent.insert("mesh", format!("there is no {}", path.display()));
+        }
+        Ok(truth) => {
+            let name = path.display();
+            let bytes = std::fs::read(&path).with_context(|| format!("{name}: cannot be read"))?;
+            let mesh = read_ply(&bytes).with_context(|| format!("{name}: not a mesh"))?;
+            screen.note("comparing the mesh with the true one");
+            let protocol = args.cull.protocol();
+            match evaluation::mesh(mesh, truth, sequence.as_mut(), protocol, args.icp) {
+                Ok(report) => metrics.mesh = Some(report),
+                Err(reason) => {
+                    metrics.absent.insert("mesh", format!("{reason:#}"));
+                }
+            }
+        }
+    }
+    metrics.warnings = sequence.warnings();
+    let json = metrics.to_json()?;
+    let path = out.join("eval.json");
+    replace_file(&path, json.as_bytes())?;
+    screen.result(&format!("{}\nwritten to {}\n", metrics.table(), path.display()), &json);
+    Ok(())
+}
+
+fn evaluate_trajectory(out: &Path, sequence: &dyn Sequence, metrics: &mut Metrics) -> Result<()> {
+    let path = out.join("trajectory.txt");
+    let name = path.display().to_string();
+    let text = std::fs::read_to_string(&path)
+        .with_context(|| format!("{name}: cannot be read; expected the output folder of a run"))?;
+    let poses = read_tum(&name, &text)?;
+    let frames = sequence.info().frames;
+    let mut stamps: Vec<(f64, usize)> = (0..frames).map(|i| (sequence.time_s(i), i)).collect();
+    stamps.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let frame_at = |t: f64| -> Option<usize> {
+        let i = stamps.partition_point(|(s, _)| *s < t - SAME_STAMP_S);
+        stamps.get(i).filter(|(s, _)| (s - t).abs() <= SAME_STAMP_S).map(|(_, i)| *i)
+    };
+    let matched: Vec<(usize, Pose)> =
+        poses.iter().filter_map(|(t, pose)| Some((frame_at(*t)?, *pose))).collect();
+    if matched.is_empty() {
+        bail!(
+            "{name}: found {} poses, none with the time stamp of a frame of {}; expected the \
+             output of a run on this recording",
+            poses.len(),
+            sequence.info().name
+        );
+    }
+    let pairs = |keep: &dyn Fn(usize) -> bool| -> Vec<PosePair> {
+        let kept = matched.iter().filter(|(i, _)| keep(*i));
+        kept.filter_map(|(i, estimate)| {
+            Some(PosePair { estimate: *estimate, truth: sequence.truth(*i)? })
+        })
+        .collect()
+    };
+    match evaluation::trajectory_of_pairs(&pairs(&|_| true)) {
+        Ok(score) => metrics.trajectory = Some(score.report),
+        Err(reason) => {
+            metrics.absent.insert("trajectory", reason.to_string());
+        }
+    }
+    if !metrics.lost_frames.is_empty() {
+        let found = pairs(&|i| !metrics.lost_frames.contains(&i));
+        let score = evaluation::trajectory_of_pairs(&found);
+        metrics.trajectory_without_lost = score.ok().map(|s| s.report);
+    }
+    Ok(())
+}
+
+fn evaluate_renders(
+    out: &Path,
+    sequence: &mut dyn Sequence,
+    screen: Screen,
+    metrics: &mut Metrics,
+) -> Result<()> {
+    let info = sequence.info().clone();
+    let folder = out.join("renders");
+    let rendered: Vec<usize> =
+        (0..info.frames).filter(|i| folder.join(format!("{i:06}.color.png")).is_file()).collect();
+    let mut scores = ViewScores::new(&info);
+    let mut progress = screen.progress("comparing pictures", rendered.len());
+    for (i, &index) in rendered.iter().enumerate() {
+        let view = read_view(&folder, index, &info)?;
+        scores.add(&sequence.frame(index)?, &view)?;
+        progress.set(i as u64 + 1, String::new);
+    }
+    progress.finish();
+    scores.report(metrics);
+    Ok(())
+}
+
+/// The pictures of a frame; without a class picture all pixels are unlabelled.
+fn read_view(folder: &Path, index: usize, info: &SequenceInfo) -> Result<View> {
+    let read = |kind: &str, expected: ColorType| -> Result<DynamicImage> {
+        let path = folder.join(format!("{index:06}.{kind}.png"));
+        let name = path.display();
+        let image = image::open(&path).with_context(|| format!("{name}: not a whole picture"))?;
+        let (w, h) = (info.camera.width, info.camera.height);
+        if (image.width(), image.height()) != (w, h) {
+            bail!(
+                "{name} (frame {index}): size: found {}x{}, expected {w}x{h} as in the recording",
+                image.width(),
+                image.height()
+            );
+        }
+        if image.color() != expected {
+            bail!("{name} (frame {index}): found {:?}, expected {expected:?}", image.color());
+        }
+        Ok(image)
+    };
+    let color = read("color", ColorType::Rgb8)?.into_rgb8().pixels().map(|p| p.0).collect();
+    let depth_m = read("depth", ColorType::L16)?
+        .into_luma16()
+        .iter()
+        .map(|&mm| (f64::from(mm) / 1000.0) as f32)
+        .collect();
+    let has_classes = folder.join(format!("{index:06}.class.png")).is_file();
+    let class = if has_classes && !info.classes.is_empty() {
+        compact(&read("class", ColorType::L16)?, &info.classes)
+    } else {
+        vec![UNLABELLED; info.camera.pixels()]
+    };
+    Ok(View { camera: info.camera, color, depth_m, class })
+}
+
+fn compact(image: &DynamicImage, table: &ClassTable) -> Vec<u8> {
+    let index_of_raw = table.index_of_raw();
+    let index = |raw: &u16| index_of_raw.get(raw).copied().unwrap_or(UNLABELLED);
+    image.to_luma16().iter().map(index).collect()
+}
+
+/// Frames with the status `lost`, if the file is there.
+fn lost_frames(timings: &Path) -> Vec<usize> {
+    let text = std::fs::read_to_string(timings).unwrap_or_default();
+    text.lines()
+        .filter(|line| line.ends_with(",lost"))
+        .filter_map(|line| line.split(',').next()?.parse().ok())
+        .collect()
+}
+
+impl CullChoice {
+    fn protocol(self) -> mte_slam_core::mesh::CullProtocol {
+        match self {
+            CullChoice::Eslam => evaluation::CULL_ESLAM,
+            CullChoice::Coslam => evaluation::CULL_COSLAM,
+        }
+    }
+}

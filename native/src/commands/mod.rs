@@ -1,0 +1,10 @@
+//! One file a subcommand.
+pub mod bench;
+pub mod demo;
+pub mod eval;
+pub mod info;
+pub mod mesh;
+pub mod render;
+pub mod run;
+pub mod shaders;
+pub mod synth;

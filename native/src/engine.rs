@@ -1,0 +1,80 @@
+//! Choosing the engine.
+use crate::{
+    args::{EngineArgs, EngineChoice},
+    errors::usage,
+    output::metrics::EngineRecord,
+};
+use anyhow::{Result, bail};
+use mte_slam_core::engine::Engine;
+
+/// An engine and what to tell about it.
+pub struct Chosen {
+    /// The engine.
+    pub engine: Engine,
+    /// For metrics.json.
+    pub record: EngineRecord,
+    /// A clause for the screen.
+    pub note: String,
+}
+
+/// Start the engine that the flags ask for. `auto` takes a graphics adapter if there is one and
+/// else the processor, and the note says which and why. An adapter that was named is never
+/// replaced by another.
+pub fn start(args: &EngineArgs) -> Result<Chosen> {
+    if args.engine == EngineChoice::Cpu {
+        if let Some(name) = &args.adapter {
+            usage!(
+                "--adapter {name}: found --engine cpu, which has no adapter, expected --engine gpu \
+                 or auto"
+            );
+        }
+        return Ok(describe(Engine::cpu(), String::new()));
+    }
+    match start_gpu(args.adapter.as_deref()) {
+        Ok(engine) => Ok(describe(engine, String::new())),
+        Err(reason) if args.engine == EngineChoice::Auto && args.adapter.is_none() => {
+            Ok(describe(Engine::cpu(), format!(", because: {reason}")))
+        }
+        Err(reason) => {
+            let flag = match &args.adapter {
+                Some(name) => format!("--adapter {name}"),
+                None => "--engine gpu".to_owned(),
+            };
+            bail!(
+                "{flag}: {reason}. `mte-slam info` lists the adapters; --engine auto or cpu works \
+                 without one."
+            )
+        }
+    }
+}
+
+#[cfg(feature = "gpu")]
+fn start_gpu(adapter: Option<&str>) -> Result<Engine, String> {
+    let options = mte_slam_core::engine::GpuOptions {
+        adapter_name: adapter.map(str::to_owned),
+        ..Default::default()
+    };
+    pollster::block_on(Engine::gpu(options)).map_err(|e| e.to_string())
+}
+
+#[cfg(not(feature = "gpu"))]
+fn start_gpu(_adapter: Option<&str>) -> Result<Engine, String> {
+    Err("this program was built without graphics adapters (feature `gpu`)".to_owned())
+}
+
+fn describe(engine: Engine, why: String) -> Chosen {
+    let info = engine.info();
+    let note = if info.kind == "cpu" {
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        format!("computing on the processor ({}, {threads} threads){why}", info.adapter)
+    } else {
+        format!("computing on {} ({})", info.adapter, info.backend)
+    };
+    let record = EngineRecord {
+        kind: info.kind.to_owned(),
+        adapter: info.adapter,
+        backend: info.backend,
+        driver: info.driver,
+    };
+    Chosen { engine, record, note }
+}

@@ -1,0 +1,202 @@
+//! The figures of a run, by the core's metrics.
+use crate::output::{
+    metrics::{Metrics, RenderRecord, SemanticFigures},
+    pictures::unlabelled_id,
+};
+use anyhow::{Context, Result, bail};
+use mte_slam_core::{
+    frame::{Frame, SequenceInfo},
+    mesh::{self, CullProtocol, Keep, Mesh, Visibility},
+    metrics::{
+        self, AteReport, ConfusionMatrix, DepthMeter, PosePair, PsnrMeter, SurfaceOptions,
+        SurfaceReport, TrajectoryError, align_rigid, ate, evaluate_surface,
+    },
+    pose::Pose,
+    sequence::Sequence,
+    slam::{PoseEstimate, View},
+};
+use std::path::Path;
+
+/// A trajectory's error.
+pub struct TrajectoryScore {
+    /// The figures.
+    pub report: AteReport,
+    /// The alignment that they were computed with.
+    pub truth_from_estimate: Pose,
+}
+
+/// Error of the estimates that `keep` keeps and whose truth is known.
+pub fn trajectory(
+    estimates: &[PoseEstimate],
+    truth: &[Option<Pose>],
+    keep: impl Fn(&PoseEstimate) -> bool,
+) -> Result<TrajectoryScore, TrajectoryError> {
+    let pairs: Vec<PosePair> = estimates
+        .iter()
+        .zip(truth)
+        .filter(|(e, _)| keep(e))
+        .filter_map(|(e, t)| Some(PosePair { estimate: e.world_from_camera, truth: (*t)? }))
+        .collect();
+    trajectory_of_pairs(&pairs)
+}
+
+/// Error of pairs.
+pub fn trajectory_of_pairs(pairs: &[PosePair]) -> Result<TrajectoryScore, TrajectoryError> {
+    let report = ate(pairs)?;
+    let estimate: Vec<_> = pairs.iter().map(|p| p.estimate.translation).collect();
+    let truth: Vec<_> = pairs.iter().map(|p| p.truth.translation).collect();
+    let alignment = align_rigid(&estimate, &truth)?;
+    Ok(TrajectoryScore { report, truth_from_estimate: alignment.target_from_source })
+}
+
+/// Collects the scores of rendered views.
+pub struct ViewScores {
+    depth: DepthMeter,
+    color: PsnrMeter,
+    classes: ConfusionMatrix,
+    frames: Vec<usize>,
+    info: SequenceInfo,
+}
+
+impl ViewScores {
+    /// No views yet.
+    pub fn new(info: &SequenceInfo) -> ViewScores {
+        ViewScores {
+            depth: DepthMeter::default(),
+            color: PsnrMeter::default(),
+            classes: ConfusionMatrix::new(info.classes.len()),
+            frames: Vec::new(),
+            info: info.clone(),
+        }
+    }
+
+    /// Add a view of `frame`.
+    pub fn add(&mut self, frame: &Frame, view: &View) -> Result<()> {
+        let place = || format!("scoring the view of frame {}", frame.index);
+        self.depth.add(&view.depth_m, &frame.depth, self.info.depth_unit_m).with_context(place)?;
+        self.color.add(&view.color, &frame.color).with_context(place)?;
+        if let Some(labels) = &frame.labels {
+            self.classes.add(labels, &view.class).with_context(place)?;
+        }
+        self.frames.push(frame.index);
+        Ok(())
+    }
+
+    /// Put the figures, or why there are none, into `metrics`.
+    pub fn report(self, metrics: &mut Metrics) {
+        if self.frames.is_empty() {
+            for section in ["depth", "color", "semantics"] {
+                metrics.absent.insert(section, "no frame was rendered".to_owned());
+            }
+            return;
+        }
+        metrics.depth = self.depth.report();
+        if metrics.depth.is_none() {
+            let reason = "no pixel has both a measured and a rendered depth";
+            metrics.absent.insert("depth", reason.to_owned());
+        }
+        metrics.color = self.color.report();
+        match self.classes.report() {
+            Some(report) => {
+                let classes = self.info.classes.classes.iter().zip(&report.iou_percent);
+                let iou_percent_by_name =
+                    classes.filter_map(|(c, iou)| Some((c.name.clone(), (*iou)?))).collect();
+                metrics.semantics = Some(SemanticFigures { report, iou_percent_by_name });
+            }
+            None => {
+                metrics.absent.insert("semantics", "there are no labels".to_owned());
+            }
+        }
+        metrics.renders = Some(RenderRecord {
+            protocol: "at estimated poses, without depth input",
+            frames: self.frames,
+            unlabelled_id: unlabelled_id(&self.info.classes),
+        });
+    }
+}
+
+/// A true mesh.
+pub struct MeshTruth {
+    /// The mesh, in the world frame of the true poses.
+    pub mesh: Mesh,
+}
+
+impl MeshTruth {
+    /// Read a PLY file.
+    pub fn read(path: &Path) -> Result<MeshTruth> {
+        let name = path.display();
+        let bytes =
+            std::fs::read(path).with_context(|| format!("{name}: the true mesh cannot be read"))?;
+        let mesh =
+            mesh::read_ply(&bytes).with_context(|| format!("{name}: not a mesh in PLY format"))?;
+        if mesh.triangles.is_empty() {
+            bail!("{name}: the true mesh: found no faces, expected a triangle mesh");
+        }
+        Ok(MeshTruth { mesh })
+    }
+
+    /// The mesh of `flag`, or else `mesh.ply` in the recording's folder, or why there is none.
+    /// A file that is there but unreadable is an error.
+    pub fn find(flag: Option<&Path>, dataset: &Path) -> Result<Result<MeshTruth, String>> {
+        if let Some(path) = flag {
+            return Ok(Ok(MeshTruth::read(path)?));
+        }
+        let path = dataset.join("mesh.ply");
+        if path.is_file() {
+            return Ok(Ok(MeshTruth::read(&path)?));
+        }
+        Ok(Err(format!("there is no true mesh ({}; --mesh names another)", path.display())))
+    }
+}
+
+/// ESLAM's culling: in a frame, and no deeper than its measured depth plus the truncation.
+pub const CULL_ESLAM: CullProtocol = CullProtocol::SensorDepth { truncation_m: 0.06 };
+/// Co-SLAM's culling: in a frame's frustum, and not hidden in a rendering of the mesh itself.
+pub const CULL_COSLAM: CullProtocol = CullProtocol::RenderedDepth { tolerance_m: 0.03 };
+/// Frames that decide what was observed; more of a long sequence add little.
+const CULLING_VIEWS: usize = 200;
+
+/// Compare a mesh with the true one, both culled to what frames at true poses observed. `icp`
+/// aligns ours to the true one first.
+pub fn mesh(
+    mut ours: Mesh,
+    truth: MeshTruth,
+    sequence: &mut dyn Sequence,
+    protocol: CullProtocol,
+    icp: bool,
+) -> Result<SurfaceReport> {
+    let info = sequence.info().clone();
+    let mut true_mesh = truth.mesh;
+    let mut seen_of_ours = Visibility::new(&ours);
+    let mut seen_of_truth = Visibility::new(&true_mesh);
+    let stride = info.frames.div_ceil(CULLING_VIEWS).max(1);
+    let mut views = 0;
+    for index in (0..info.frames).step_by(stride) {
+        let Some(world_from_camera) = sequence.truth(index) else { continue };
+        let frame = sequence.frame(index)?;
+        let view = mesh::View {
+            camera: &info.camera,
+            world_from_camera,
+            depth: &frame.depth,
+            depth_unit_m: info.depth_unit_m,
+        };
+        seen_of_ours.add_view(&ours, &view, protocol);
+        seen_of_truth.add_view(&true_mesh, &view, protocol);
+        views += 1;
+    }
+    if views == 0 {
+        bail!("no frame has a true pose, so what was observed is not known");
+    }
+    mesh::cull(&mut ours, &seen_of_ours, Keep::AnySeen);
+    mesh::cull(&mut true_mesh, &seen_of_truth, Keep::AnySeen);
+    let options = SurfaceOptions::default();
+    if icp {
+        let aligned = metrics::icp(&ours, &true_mesh, 0.1, options.seed)?;
+        ours.transform(&aligned);
+    }
+    let mut report = evaluate_surface(&ours, &true_mesh, &options)?;
+    let alignment = if icp { "after ICP" } else { "no alignment" };
+    report.protocol =
+        format!("{}; {} in {views} views; {alignment}", report.protocol, protocol.name());
+    Ok(report)
+}

@@ -1,0 +1,72 @@
+//! Opening what is read.
+use crate::{
+    args::SelectionArgs, errors::usage, evaluation::MeshTruth, screen::Screen, source::FolderSource,
+};
+use anyhow::{Result, anyhow};
+use mte_slam_core::{
+    classes::UNLABELLED,
+    dataset::{self, LabelSource, Layout, OpenOptions},
+    mesh::Mesh,
+    sequence::Sequence,
+    synth::{SyntheticMesh, SyntheticOptions, SyntheticSequence},
+};
+use std::path::Path;
+
+/// Open a recording.
+pub fn open(path: &Path, selection: &SelectionArgs, screen: Screen) -> Result<Box<dyn Sequence>> {
+    let layout = selection.layout.as_deref().map(layout_named).transpose()?;
+    let source = FolderSource::open(path)?;
+    if let [first, ..] = source.skipped_links() {
+        let (name, n) = (path.display(), source.skipped_links().len());
+        screen.note(&format!(
+            "note: {name}: {n} links that lead out of it, such as {first}, are skipped"
+        ));
+    }
+    let labels = match selection.labels.as_str() {
+        "none" => LabelSource::None,
+        "dataset" => LabelSource::Dataset,
+        folder => LabelSource::Folder(Box::new(FolderSource::open(Path::new(folder))?)),
+    };
+    let options = OpenOptions {
+        layout,
+        start: selection.start,
+        stride: selection.stride,
+        frames: selection.frames,
+        scale: selection.scale,
+        labels,
+        ..OpenOptions::default()
+    };
+    dataset::open(Box::new(source), options).map_err(|e| {
+        let (message, name) = (e.to_string(), path.display().to_string());
+        // Errors about one file name it below the folder only.
+        if message.contains(&name) { anyhow!(message) } else { anyhow!("{name}: {message}") }
+    })
+}
+
+fn layout_named(name: &str) -> Result<Layout> {
+    if let Some(layout) = Layout::ALL.into_iter().find(|l| l.name() == name) {
+        return Ok(layout);
+    }
+    let names = Layout::ALL.map(Layout::name).join(", ");
+    usage!("--layout: found `{name}`, expected one of {names}");
+}
+
+/// The built-in sequence.
+pub fn built_in(frames: usize, width: u32) -> SyntheticSequence {
+    let height = width / 4 * 3;
+    SyntheticSequence::new(SyntheticOptions { frames, width, height, ..Default::default() })
+}
+
+/// The built-in sequence's mesh as the core's mesh type; a vertex takes the class of its faces.
+pub fn true_mesh(synthetic: SyntheticMesh) -> MeshTruth {
+    let SyntheticMesh { positions, triangles, face_class, colors } = synthetic;
+    let mut classes = vec![UNLABELLED; positions.len()];
+    for (triangle, class) in triangles.iter().zip(face_class) {
+        for &i in triangle {
+            classes[i as usize] = class;
+        }
+    }
+    let mut mesh = Mesh { positions, triangles, colors, classes, ..Mesh::default() };
+    mesh.compute_normals();
+    MeshTruth { mesh }
+}

@@ -1,0 +1,289 @@
+//! `metrics.json`: every figure with its unit in the key and its protocol beside it, and the table
+//! that people read at the end of a run.
+use super::timings::Spread;
+use mte_slam_core::metrics::{AteReport, DepthReport, PsnrReport, SemanticReport, SurfaceReport};
+use serde::Serialize;
+use std::{collections::BTreeMap, fmt::Write};
+
+/// Everything that is reported. A section that could not be computed is absent, and `absent` says
+/// why.
+#[derive(Debug, Default, Serialize)]
+pub struct Metrics {
+    /// Name and version of this program.
+    pub program: String,
+    /// What was read.
+    pub sequence: SequenceRecord,
+    /// How it was processed; none in an evaluation of files.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub configuration: Option<ConfigurationRecord>,
+    /// What computed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub engine: Option<EngineRecord>,
+    /// Indices of the frames whose pose could not be tracked.
+    pub lost_frames: Vec<usize>,
+    /// What was assumed, skipped or masked while reading.
+    pub warnings: Vec<String>,
+    /// Trajectory error over all frames with a true pose, lost ones included.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trajectory: Option<AteReport>,
+    /// The same without the lost frames, where there are any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trajectory_without_lost: Option<AteReport>,
+    /// What was rendered.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub renders: Option<RenderRecord>,
+    /// Rendered depth against the sensor's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub depth: Option<DepthReport>,
+    /// Rendered colour against the input.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub color: Option<PsnrReport>,
+    /// Rendered classes against the labels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub semantics: Option<SemanticFigures>,
+    /// Mesh against the true mesh.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<SurfaceReport>,
+    /// Time a frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time: Option<TimeFigures>,
+    /// Memory.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub memory: Option<MemoryFigures>,
+    /// Section -> why it is not there.
+    pub absent: BTreeMap<&'static str, String>,
+}
+
+/// What was read.
+#[derive(Debug, Default, Clone, Serialize)]
+pub struct SequenceRecord {
+    /// Name of the sequence.
+    pub name: String,
+    /// Layout of its files.
+    pub layout: String,
+    /// Frames processed.
+    pub frames: usize,
+    /// Width of the images as processed.
+    pub width_pixels: u32,
+    /// Height of the images as processed.
+    pub height_pixels: u32,
+    /// First frame taken.
+    pub start: usize,
+    /// Every how many-th frame was taken.
+    pub stride: usize,
+    /// Factor on the images' size.
+    pub scale: f64,
+    /// `none`, `dataset` or a folder.
+    pub labels: String,
+    /// Number of classes.
+    pub classes: usize,
+}
+
+/// How it was processed.
+#[derive(Debug, Clone, Serialize)]
+pub struct ConfigurationRecord {
+    /// Preset that the configuration started from.
+    pub preset: String,
+    /// Hash of all values (FNV-1a 64 of their TOML).
+    pub hash: String,
+    /// Seed.
+    pub seed: u32,
+    /// Tracker.
+    pub tracker: String,
+}
+
+/// What computed.
+#[derive(Debug, Clone, Serialize)]
+pub struct EngineRecord {
+    /// `gpu` or `cpu`.
+    pub kind: String,
+    /// Adapter, or processor architecture.
+    pub adapter: String,
+    /// Graphics interface.
+    pub backend: String,
+    /// Driver.
+    pub driver: String,
+}
+
+/// Rendered classes.
+#[derive(Debug, Clone, Serialize)]
+pub struct SemanticFigures {
+    /// The figures.
+    #[serde(flatten)]
+    pub report: SemanticReport,
+    /// IoU \[%\] by the class's name, of those with a non-empty union.
+    pub iou_percent_by_name: BTreeMap<String, f64>,
+}
+
+/// What was rendered.
+#[derive(Debug, Clone, Serialize)]
+pub struct RenderRecord {
+    /// How the pictures were made.
+    pub protocol: &'static str,
+    /// Indices of the frames.
+    pub frames: Vec<usize>,
+    /// Id in the class pictures where there is no class.
+    pub unlabelled_id: u16,
+}
+
+/// Time a frame.
+#[derive(Debug, Clone, Serialize)]
+pub struct TimeFigures {
+    /// What is counted.
+    pub protocol: &'static str,
+    /// Tracking.
+    pub tracking: Spread,
+    /// Mapping, over the frames that were mapped.
+    pub mapping: Spread,
+    /// Both and what is between them.
+    pub total: Spread,
+    /// The whole program, with loading, evaluation and mesh.
+    pub wall_s: f64,
+}
+
+/// Memory.
+#[derive(Debug, Clone, Serialize)]
+pub struct MemoryFigures {
+    /// What is counted.
+    pub protocol: &'static str,
+    /// Peak resident memory of the process.
+    pub peak_host_bytes: Option<u64>,
+    /// Why that is unknown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub peak_host_unknown: Option<String>,
+    /// Buffers of the engine.
+    pub device_bytes: u64,
+}
+
+impl Metrics {
+    /// The file's text.
+    pub fn to_json(&self) -> anyhow::Result<String> {
+        Ok(serde_json::to_string_pretty(self)? + "\n")
+    }
+
+    /// The table for people.
+    pub fn table(&self) -> String {
+        let mut rows: Vec<(String, String, &str)> = Vec::new();
+        let mut row = |name: &str, value: String, protocol| {
+            rows.push((name.to_owned(), value, protocol));
+        };
+        if let Some(t) = &self.trajectory {
+            row("ATE RMSE, aligned", format!("{:.3} cm", t.aligned_cm.rmse), &t.protocol);
+            row("ATE RMSE, unaligned", format!("{:.3} cm", t.unaligned_cm.rmse), "");
+        }
+        if let Some(t) = &self.trajectory_without_lost {
+            row("ATE RMSE, aligned, not lost", format!("{:.3} cm", t.aligned_cm.rmse), "");
+        }
+        if let Some(d) = &self.depth {
+            row("depth L1, views", format!("{:.2} cm", d.l1_cm), &d.protocol);
+            row("depth bias, coverage", depth_detail(d), "");
+        }
+        if let Some(c) = &self.color {
+            row("PSNR, views", format!("{:.2} dB", c.mean_of_psnr_db), &c.protocol);
+        }
+        if let Some(s) = &self.semantics {
+            row("mIoU", format!("{:.2} %", s.report.miou_percent), &s.report.protocol);
+            row("pixel accuracy", format!("{:.2} %", s.report.pixel_accuracy_percent), "");
+        }
+        if let Some(m) = &self.mesh {
+            let s = &m.point_to_surface;
+            row("mesh accuracy", format!("{:.2} cm", s.accuracy_cm), &m.protocol);
+            row("mesh completion", format!("{:.2} cm", s.completion_cm), "");
+            let ratio = format!("{:.1} %", s.completion_ratio_percent);
+            row(&format!("completion ratio < {:.0} cm", m.threshold_cm), ratio, "");
+            let p = &m.point_to_point;
+            let peers = format!("{:.2}, {:.2} cm", p.accuracy_cm, p.completion_cm);
+            row("the same point to point", peers, "");
+            row("floor of point to point", format!("{:.2} cm", m.sampling_floor_cm), "");
+        }
+        if let Some(t) = &self.time {
+            let of = |s: &Spread| format!("{:.3} s (p95 {:.3})", s.median_s, s.p95_s);
+            row("tracking a frame", of(&t.tracking), t.protocol);
+            row("mapping a mapped frame", of(&t.mapping), "");
+            row("total a frame", of(&t.total), "");
+            row("whole program", format!("{:.1} s", t.wall_s), "");
+        }
+        if let Some(m) = &self.memory {
+            let mib = |b: u64| format!("{:.0} MiB", b as f64 / f64::from(1 << 20));
+            let host = m.peak_host_bytes.map_or("unknown".to_owned(), mib);
+            row("peak host memory", host, m.protocol);
+            row("device buffers", mib(m.device_bytes), "");
+        }
+        row("lost frames", lost_text(&self.lost_frames), "");
+        let name_width = rows.iter().map(|r| r.0.len()).max().unwrap_or(0);
+        let mut text = String::new();
+        // Protocols are long: numbered, and listed below the figures they belong to.
+        let mut protocols = Vec::new();
+        for (name, value, protocol) in rows {
+            let mut line = format!("{name:name_width$}  {value:26}");
+            if !protocol.is_empty() {
+                protocols.push(protocol);
+                line += &format!("  [{}]", protocols.len());
+            }
+            let _ = writeln!(text, "{}", line.trim_end());
+        }
+        for (i, protocol) in protocols.iter().enumerate() {
+            let _ = writeln!(text, "{}", wrapped(&format!("[{}] {protocol}", i + 1)));
+        }
+        for warning in &self.warnings {
+            let _ = writeln!(text, "note: {warning}");
+        }
+        for (section, reason) in &self.absent {
+            let _ = writeln!(text, "no {section}: {reason}");
+        }
+        text
+    }
+}
+
+/// Lines of at most 96 characters; later ones indented.
+fn wrapped(text: &str) -> String {
+    let mut lines = String::new();
+    let mut length = 0;
+    for word in text.split(' ') {
+        if length > 0 && length + 1 + word.len() > 96 {
+            lines += "\n   ";
+            length = 3;
+        }
+        if length > 0 {
+            lines.push(' ');
+            length += 1;
+        }
+        lines += word;
+        length += word.len();
+    }
+    lines
+}
+
+fn depth_detail(d: &DepthReport) -> String {
+    format!("{:+.2} cm, {:.1} %", d.bias_cm, 100.0 * d.coverage)
+}
+
+fn lost_text(lost: &[usize]) -> String {
+    if lost.is_empty() {
+        return "none".to_owned();
+    }
+    let shown: Vec<String> = lost.iter().take(12).map(usize::to_string).collect();
+    let more = if lost.len() > shown.len() { ", ..." } else { "" };
+    format!("{} ({}{more})", lost.len(), shown.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn absent_sections_say_why_and_json_has_units() {
+        let mut m = Metrics { program: "p".to_owned(), ..Metrics::default() };
+        m.lost_frames = (0..20).collect();
+        m.absent.insert("mesh", "there is no true mesh".to_owned());
+        let pose = mte_slam_core::pose::Pose::IDENTITY;
+        let pair = mte_slam_core::metrics::PosePair { estimate: pose, truth: pose };
+        m.trajectory = mte_slam_core::metrics::ate(&[pair; 4]).ok();
+        let table = m.table();
+        assert!(table.contains("no mesh: there is no true mesh"), "{table}");
+        assert!(table.contains("0.000 cm") && table.contains("20 (0, 1"), "{table}");
+        let json: serde_json::Value = serde_json::from_str(&m.to_json().unwrap()).unwrap();
+        assert_eq!(json["trajectory"]["aligned_cm"]["rmse"], 0.0);
+        assert!(json.get("depth").is_none());
+    }
+}

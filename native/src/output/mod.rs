@@ -1,0 +1,12 @@
+//! Everything the program writes.
+pub mod checkpoint;
+pub mod colormap;
+pub mod folder;
+pub mod font;
+pub mod meshes;
+pub mod metrics;
+pub mod pictures;
+pub mod plot;
+pub mod sheet;
+pub mod timings;
+pub mod trajectory;

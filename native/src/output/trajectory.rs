@@ -1,0 +1,109 @@
+//! Trajectories in TUM format: one line a frame, `t x y z qx qy qz qw` of `world_from_camera`,
+//! seconds and metres; what `evo` reads.
+use anyhow::{Context, Result, bail};
+use glam::{DQuat, DVec3};
+use mte_slam_core::pose::Pose;
+use std::fmt::Write;
+
+/// Text of the poses with their time stamps \[s\].
+pub fn write_tum(poses: impl Iterator<Item = (f64, Pose)>) -> String {
+    let mut text = String::from("# time_s x_m y_m z_m qx qy qz qw (world_from_camera)\n");
+    for (time_s, pose) in poses {
+        let (t, q) = (pose.translation, canonical(pose.quaternion()));
+        // Digits for 1e-9 m and 1e-12 of a quaternion: reading it back moves no figure.
+        let _ = writeln!(
+            text,
+            "{} {:.9} {:.9} {:.9} {:.12} {:.12} {:.12} {:.12}",
+            stamp(time_s),
+            t.x,
+            t.y,
+            t.z,
+            q.x,
+            q.y,
+            q.z,
+            q.w
+        );
+    }
+    text
+}
+
+/// A time stamp without loss: six decimals, as the data sets print them, if that gives the number
+/// back, else the shortest text that does.
+pub fn stamp(time_s: f64) -> String {
+    let six = format!("{time_s:.6}");
+    if six.parse::<f64>() == Ok(time_s) { six } else { format!("{time_s}") }
+}
+
+// q and -q are one rotation; w >= 0 makes files comparable.
+fn canonical(q: DQuat) -> DQuat {
+    if q.w < 0.0 { -q } else { q }
+}
+
+/// Read such a file; `name` is for messages.
+pub fn read_tum(name: &str, text: &str) -> Result<Vec<(f64, Pose)>> {
+    let mut poses = Vec::new();
+    for (i, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let numbers: Vec<f64> = line
+            .split_whitespace()
+            .map(str::parse)
+            .collect::<Result<_, _>>()
+            .ok()
+            .filter(|n: &Vec<f64>| n.iter().all(|x| x.is_finite()))
+            .with_context(|| {
+                format!("{name} line {}: found `{line}`, expected 8 finite numbers", i + 1)
+            })?;
+        let [t, x, y, z, qx, qy, qz, qw] = numbers[..] else {
+            bail!(
+                "{name} line {}: found {} numbers, expected 8: t x y z qx qy qz qw",
+                i + 1,
+                numbers.len()
+            );
+        };
+        let q = DQuat::from_xyzw(qx, qy, qz, qw);
+        if (q.length() - 1.0).abs() > 1e-2 {
+            bail!(
+                "{name} line {}: found a quaternion of length {:.3}, expected 1",
+                i + 1,
+                q.length()
+            );
+        }
+        poses.push((t, Pose::from_quaternion(DVec3::new(x, y, z), q)));
+    }
+    Ok(poses)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn round_trip_keeps_stamps_and_poses() {
+        let stamps = [0.0, 12.0, 1341841278.8427, 0.1234567891, 1341841278.8427003];
+        let pose = Pose::from_twist(&[0.3, -2.0, 1.0, 0.4, -0.2, 3.1]);
+        let text = write_tum(stamps.iter().map(|&t| (t, pose)));
+        assert!(text.contains("\n1341841278.842700 0.3"), "{text}");
+        let read = read_tum("t", &text).unwrap();
+        assert_eq!(read.iter().map(|r| r.0).collect::<Vec<_>>(), stamps);
+        for (_, p) in read {
+            let e = p.compose(&pose.inverse());
+            assert!(e.translation.length() < 1e-8 && e.angle_rad() < 1e-10);
+        }
+    }
+
+    #[test]
+    fn bad_lines_are_named() {
+        for (text, part) in [
+            ("0 1 2 3 0 0 0", "found 7 numbers"),
+            ("0 1 2 nan 0 0 0 1", "line 1"),
+            ("0 1 2 3 0 0 0 2", "quaternion of length 2"),
+            ("# x\n0 1 2 3 0 0 zero 1", "line 2"),
+        ] {
+            let error = read_tum("trajectory.txt", text).unwrap_err().to_string();
+            assert!(error.contains(part) && error.contains("trajectory.txt"), "{error}");
+        }
+    }
+}

@@ -1,0 +1,381 @@
+//! From a sequence to a filled output folder: what `run` and `demo` share.
+use crate::{
+    args::{EngineArgs, OutputArgs},
+    configuration::{self, Effective},
+    engine,
+    evaluation::{self, MeshTruth, ViewScores},
+    output::{
+        checkpoint,
+        folder::OutputFolder,
+        meshes,
+        metrics::{ConfigurationRecord, MemoryFigures, Metrics, SequenceRecord, TimeFigures},
+        pictures, plot, sheet,
+        timings::{Spread, Timing, write_csv},
+        trajectory::write_tum,
+    },
+    record::{RunRecord, config_file},
+    screen::Screen,
+};
+use anyhow::{Context, Result};
+use glam::DVec3;
+use mte_slam_core::{
+    classes::ClassTable,
+    frame::SequenceInfo,
+    mesh::Mesh,
+    pose::Pose,
+    sequence::Sequence,
+    slam::{FrameReport, PoseEstimate, Slam, TrackingStatus, View},
+};
+use pollster::block_on;
+use std::{
+    path::{Path, PathBuf},
+    sync::OnceLock,
+    time::Instant,
+};
+
+/// Everything that a run needs.
+pub struct Job<'a> {
+    /// What is read.
+    pub sequence: Box<dyn Sequence>,
+    /// How it was opened (engine fields are filled in here).
+    pub record: RunRecord,
+    /// The configuration.
+    pub effective: Effective,
+    /// Engine flags.
+    pub engine: &'a EngineArgs,
+    /// Output flags.
+    pub output: &'a OutputArgs,
+    /// Output folder when the flags name none.
+    pub default_out: PathBuf,
+    /// True mesh, if there is one, or why there is none.
+    pub truth_mesh: Result<MeshTruth, String>,
+}
+
+/// Do it.
+pub fn run(job: Job, screen: Screen) -> Result<()> {
+    let start = Instant::now();
+    let Job { mut sequence, mut record, effective, output, .. } = job;
+    let info = sequence.info().clone();
+    // Checked before anything takes time.
+    let path = output.out.clone().unwrap_or(job.default_out);
+    let folder = OutputFolder::prepare(&path, output.force)?;
+    let chosen = engine::start(job.engine)?;
+    record.set_engine(&chosen.record);
+    screen.note(&format!(
+        "{}: {} frames of {}x{} ({}), {} classes; {}",
+        info.name,
+        info.frames,
+        info.camera.width,
+        info.camera.height,
+        info.layout,
+        info.classes.len(),
+        chosen.note
+    ));
+    for warning in sequence.warnings() {
+        screen.note(&format!("note: {warning}"));
+    }
+    let mut slam = block_on(Slam::new(chosen.engine, effective.config.clone(), &info))
+        .context("the map cannot be set up")?;
+    slam.set_clock(clock_s);
+
+    let timings = process(&mut slam, sequence.as_mut(), &record.dataset, screen)?;
+    let estimates = slam.trajectory();
+    let truth: Vec<_> = estimates.iter().map(|e| sequence.truth(e.frame)).collect();
+
+    let mut metrics = Metrics {
+        program: format!("mte-slam {}", env!("CARGO_PKG_VERSION")),
+        sequence: sequence_record(&info, &record),
+        configuration: Some(configuration_record(&effective)?),
+        engine: Some(chosen.record),
+        ..Metrics::default()
+    };
+    metrics.lost_frames =
+        estimates.iter().filter(|e| e.status == TrackingStatus::Lost).map(|e| e.frame).collect();
+
+    write_trajectory(&folder, sequence.as_ref(), &estimates, &truth, &mut metrics)?;
+    let scores = render_views(&mut slam, sequence.as_mut(), &folder, &estimates, output, screen)?;
+    scores.report(&mut metrics);
+    if output.no_mesh {
+        metrics.absent.insert("mesh", "--no-mesh was given".to_owned());
+    } else {
+        let resolution = output.mesh_resolution.unwrap_or(effective.config.mesh.resolution_m);
+        let mesh = extract_mesh(&mut slam, resolution, screen)?;
+        meshes::write(&mesh, &info.classes, &mut |name, bytes| folder.write(name, bytes))?;
+        match job.truth_mesh {
+            Ok(true_mesh) => {
+                screen.note("comparing the mesh with the true one");
+                let protocol = evaluation::CULL_ESLAM;
+                match evaluation::mesh(mesh, true_mesh, sequence.as_mut(), protocol, false) {
+                    Ok(report) => metrics.mesh = Some(report),
+                    Err(reason) => {
+                        metrics.absent.insert("mesh", format!("{reason:#}"));
+                    }
+                }
+            }
+            Err(reason) => {
+                metrics.absent.insert("mesh", reason);
+            }
+        }
+    }
+
+    let saved = block_on(slam.checkpoint()).context("the map cannot be saved")?;
+    folder.write("checkpoint.safetensors", &checkpoint::write(&saved))?;
+    drop(saved);
+    folder.write("timings.csv", write_csv(&timings).as_bytes())?;
+    record.config_hash = configuration::hash(&effective.config)?;
+    folder.write("config.toml", config_file(&effective.config, &record)?.as_bytes())?;
+
+    metrics.warnings = sequence.warnings();
+    metrics.time = Some(time_figures(&timings, start));
+    metrics.memory = Some(memory_figures(slam.memory_bytes() as u64));
+    let json = metrics.to_json()?;
+    folder.write("metrics.json", json.as_bytes())?;
+    folder.publish()?;
+    screen.result(&format!("{}\nwritten to {}\n", metrics.table(), path.display()), &json);
+    Ok(())
+}
+
+/// Seconds since the first call, for the reports of the core (which has no clock of its own).
+fn clock_s() -> f64 {
+    static START: OnceLock<Instant> = OnceLock::new();
+    START.get_or_init(Instant::now).elapsed().as_secs_f64()
+}
+
+/// Restore the map of an output folder's checkpoint.
+pub fn restore(out: &Path, engine: &EngineArgs, screen: Screen) -> Result<Slam> {
+    let path = out.join("checkpoint.safetensors");
+    let saved = checkpoint::read_file(&path)?;
+    let chosen = engine::start(engine)?;
+    let slam = block_on(Slam::restore(chosen.engine, &saved))
+        .with_context(|| format!("{}: the map cannot be restored", path.display()))?;
+    screen.note(&format!("{}: {}", slam.info().name, chosen.note));
+    Ok(slam)
+}
+
+/// Feed every frame; what each cost.
+fn process(
+    slam: &mut Slam,
+    sequence: &mut dyn Sequence,
+    recording: &str,
+    screen: Screen,
+) -> Result<Vec<Timing>> {
+    let frames = sequence.info().frames;
+    let mut progress = screen.progress("tracking and mapping", frames);
+    let mut timings = Vec::with_capacity(frames);
+    for index in 0..frames {
+        let frame = sequence.frame(index).with_context(|| recording.to_owned())?;
+        let begin = Instant::now();
+        let report = block_on(slam.process(&frame))
+            .with_context(|| format!("frame {} (index {index})", frame.number))?;
+        timings.push(Timing {
+            frame: index,
+            tracking_s: report.tracking_s,
+            // Without mapping the core's clock still sees some nanoseconds.
+            mapping_s: if report.losses.is_some() { report.mapping_s } else { 0.0 },
+            total_s: begin.elapsed().as_secs_f64(),
+            status: status_name(report.status),
+        });
+        let done = index as u64 + 1;
+        if progress.wants_message(done) {
+            let message = live_message(slam, sequence, &report);
+            progress.set(done, || message);
+        }
+    }
+    block_on(slam.finish()).context("the last optimisation failed")?;
+    progress.finish();
+    Ok(timings)
+}
+
+fn live_message(slam: &Slam, sequence: &dyn Sequence, report: &FrameReport) -> String {
+    let estimates = slam.trajectory();
+    let truth: Vec<_> = estimates.iter().map(|e| sequence.truth(e.frame)).collect();
+    let mut parts = Vec::new();
+    if let Ok(score) = evaluation::trajectory(&estimates, &truth, |_| true) {
+        parts.push(format!("ATE {:.2} cm", score.report.aligned_cm.rmse));
+    }
+    if let Some(losses) = &report.losses {
+        parts.push(format!("loss {:.3}", losses.total));
+    }
+    let lost = estimates.iter().filter(|e| e.status == TrackingStatus::Lost).count();
+    if lost > 0 {
+        parts.push(format!("{lost} lost"));
+    }
+    parts.join("  ")
+}
+
+fn status_name(status: TrackingStatus) -> &'static str {
+    match status {
+        TrackingStatus::First => "first",
+        TrackingStatus::Tracked => "tracked",
+        TrackingStatus::Lost => "lost",
+    }
+}
+
+fn write_trajectory(
+    folder: &OutputFolder,
+    sequence: &dyn Sequence,
+    estimates: &[PoseEstimate],
+    truth: &[Option<Pose>],
+    metrics: &mut Metrics,
+) -> Result<()> {
+    let text = write_tum(estimates.iter().map(|e| (e.time_s, e.world_from_camera)));
+    folder.write("trajectory.txt", text.as_bytes())?;
+    let known: Vec<_> =
+        estimates.iter().zip(truth).filter_map(|(e, t)| Some((e.time_s, (*t)?))).collect();
+    if !known.is_empty() {
+        folder.write("trajectory_gt.txt", write_tum(known.iter().copied()).as_bytes())?;
+    }
+    let score = evaluation::trajectory(estimates, truth, |_| true);
+    let mut subtitle = format!("{} frames", estimates.len());
+    let mut points: Vec<DVec3> =
+        estimates.iter().map(|e| e.world_from_camera.translation).collect();
+    match &score {
+        Ok(score) => {
+            for p in &mut points {
+                *p = score.truth_from_estimate.transform_point(*p);
+            }
+            subtitle += &format!(
+                ", ATE RMSE {:.3} cm aligned (as drawn), {:.3} cm unaligned",
+                score.report.aligned_cm.rmse, score.report.unaligned_cm.rmse
+            );
+        }
+        Err(reason) => {
+            subtitle += ", no ground truth";
+            metrics.absent.insert("trajectory", reason.to_string());
+        }
+    }
+    let lost: Vec<bool> = estimates.iter().map(|e| e.status == TrackingStatus::Lost).collect();
+    if lost.contains(&true) {
+        subtitle += &format!(", {} lost", metrics.lost_frames.len());
+    }
+    let up = estimates.iter().map(|e| -e.world_from_camera.rotation.y_axis).sum();
+    let true_points: Vec<DVec3> = known.iter().map(|(_, p)| p.translation).collect();
+    let title = &sequence.info().name;
+    let picture = plot::Plot {
+        title,
+        subtitle: &subtitle,
+        estimate: &points,
+        lost: &lost,
+        truth: &true_points,
+        up,
+    };
+    folder.write("trajectory.svg", plot::svg(&picture).as_bytes())?;
+    metrics.trajectory = score.ok().map(|s| s.report);
+    if lost.contains(&true) {
+        let not_lost = |e: &PoseEstimate| e.status != TrackingStatus::Lost;
+        metrics.trajectory_without_lost =
+            evaluation::trajectory(estimates, truth, not_lost).ok().map(|s| s.report);
+    }
+    Ok(())
+}
+
+/// Render every K-th frame at its estimated pose; write the pictures, and score them.
+fn render_views(
+    slam: &mut Slam,
+    sequence: &mut dyn Sequence,
+    folder: &OutputFolder,
+    estimates: &[PoseEstimate],
+    output: &OutputArgs,
+    screen: Screen,
+) -> Result<ViewScores> {
+    let info = sequence.info().clone();
+    let mut scores = ViewScores::new(&info);
+    if output.render_every == 0 {
+        return Ok(scores);
+    }
+    let chosen: Vec<_> = estimates.iter().step_by(output.render_every).collect();
+    let mut progress = screen.progress("rendering", chosen.len());
+    for (i, estimate) in chosen.iter().enumerate() {
+        let frame = sequence.frame(estimate.frame).with_context(|| info.name.clone())?;
+        let view = block_on(slam.render(&estimate.world_from_camera, &info.camera))
+            .with_context(|| format!("rendering frame {}", estimate.frame))?;
+        let stem = format!("renders/{:06}", estimate.frame);
+        write_view(&view, &info.classes, &mut |kind, bytes| {
+            folder.write(&format!("{stem}.{kind}.png"), bytes)
+        })?;
+        let title = format!(
+            "{}  frame {}  rendered at the estimated pose, without depth input",
+            info.name, estimate.frame
+        );
+        let picture = sheet::sheet(&title, &frame, info.depth_unit_m, &view, &info.classes)?;
+        folder.write(&format!("{stem}.sheet.png"), &picture)?;
+        scores.add(&frame, &view)?;
+        progress.set(i as u64 + 1, String::new);
+    }
+    progress.finish();
+    Ok(scores)
+}
+
+/// Colour, depth and, with classes, class picture of a view, given to `write` with their kind.
+pub fn write_view(
+    view: &View,
+    table: &ClassTable,
+    write: &mut dyn FnMut(&str, &[u8]) -> Result<()>,
+) -> Result<()> {
+    let (w, h) = (view.camera.width, view.camera.height);
+    write("color", &pictures::color_png(w, h, &view.color)?)?;
+    write("depth", &pictures::depth_png(w, h, &view.depth_m)?)?;
+    if !table.is_empty() {
+        write("class", &pictures::class_png(w, h, &view.class, table)?)?;
+    }
+    Ok(())
+}
+
+/// The mesh of the map, with progress.
+pub fn extract_mesh(slam: &mut Slam, resolution_m: f64, screen: Screen) -> Result<Mesh> {
+    let mut progress = screen.progress("meshing", 100);
+    let mesh = block_on(slam.extract_mesh(resolution_m, &mut |part| {
+        progress.set((part * 100.0) as u64, String::new);
+    }))
+    .context("the mesh cannot be extracted")?;
+    progress.finish();
+    Ok(mesh)
+}
+
+/// What was read, for metrics.json.
+pub fn sequence_record(info: &SequenceInfo, record: &RunRecord) -> SequenceRecord {
+    SequenceRecord {
+        name: info.name.clone(),
+        layout: info.layout.to_owned(),
+        frames: info.frames,
+        width_pixels: info.camera.width,
+        height_pixels: info.camera.height,
+        start: record.start,
+        stride: record.stride,
+        scale: record.scale,
+        labels: record.labels.clone(),
+        classes: info.classes.len(),
+    }
+}
+
+fn configuration_record(effective: &Effective) -> Result<ConfigurationRecord> {
+    Ok(ConfigurationRecord {
+        preset: effective.preset.clone(),
+        hash: configuration::hash(&effective.config)?,
+        seed: effective.config.seed,
+        tracker: format!("{:?}", effective.config.tracking.tracker).to_lowercase(),
+    })
+}
+
+fn time_figures(timings: &[Timing], start: Instant) -> TimeFigures {
+    TimeFigures {
+        protocol: "wall clock a frame; reading and decoding images left out, evaluation too",
+        tracking: Spread::of(timings.iter().skip(1).map(|t| t.tracking_s)),
+        mapping: Spread::of(timings.iter().map(|t| t.mapping_s).filter(|s| *s > 0.0)),
+        total: Spread::of(timings.iter().map(|t| t.total_s)),
+        wall_s: start.elapsed().as_secs_f64(),
+    }
+}
+
+fn memory_figures(device_bytes: u64) -> MemoryFigures {
+    let (peak_host_bytes, peak_host_unknown) = match crate::memory::peak_host_bytes() {
+        Ok(bytes) => (Some(bytes), None),
+        Err(reason) => (None, Some(reason)),
+    };
+    MemoryFigures {
+        protocol: "host: peak resident set of the process (with software adapters it holds the device's buffers); device: buffers of the engine",
+        peak_host_bytes,
+        peak_host_unknown,
+        device_bytes,
+    }
+}

@@ -1,0 +1,102 @@
+//! `config.toml`: the configuration with, in `[run]`, where it was used and on what.
+use crate::{configuration, output::metrics::EngineRecord};
+use anyhow::{Context, Result};
+use mte_slam_core::config::Config;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// What a run records beside its configuration. `--config` skips it, `eval` reads it.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(default)]
+pub struct RunRecord {
+    /// Version of this program.
+    pub version: String,
+    /// Preset that the configuration started from.
+    pub preset: String,
+    /// Hash of the configuration.
+    pub config_hash: String,
+    /// The recording as given, or `built-in`.
+    pub dataset: String,
+    /// Layout of its files.
+    pub layout: String,
+    /// First frame taken.
+    pub start: usize,
+    /// Every how many-th frame was taken.
+    pub stride: usize,
+    /// Frames taken.
+    pub frames: usize,
+    /// Factor on the images' size.
+    pub scale: f64,
+    /// `none`, `dataset` or a folder.
+    pub labels: String,
+    /// `gpu` or `cpu`.
+    pub engine: String,
+    /// Adapter, or processor architecture.
+    pub adapter: String,
+    /// Graphics interface.
+    pub backend: String,
+    /// Driver.
+    pub driver: String,
+}
+
+impl Default for RunRecord {
+    fn default() -> Self {
+        RunRecord {
+            version: String::new(),
+            preset: String::new(),
+            config_hash: String::new(),
+            dataset: String::new(),
+            layout: String::new(),
+            start: 0,
+            stride: 1,
+            frames: 0,
+            scale: 1.0,
+            labels: "dataset".to_owned(),
+            engine: String::new(),
+            adapter: String::new(),
+            backend: String::new(),
+            driver: String::new(),
+        }
+    }
+}
+
+impl RunRecord {
+    /// Note the engine.
+    pub fn set_engine(&mut self, engine: &EngineRecord) {
+        self.engine.clone_from(&engine.kind);
+        self.adapter.clone_from(&engine.adapter);
+        self.backend.clone_from(&engine.backend);
+        self.driver.clone_from(&engine.driver);
+    }
+}
+
+/// The text of config.toml.
+pub fn config_file(config: &Config, run: &RunRecord) -> Result<String> {
+    #[derive(Serialize)]
+    struct Tail<'a> {
+        run: &'a RunRecord,
+    }
+    let tail = toml::to_string(&Tail { run }).context("[run] cannot be written as TOML")?;
+    Ok(format!(
+        "# The complete configuration of a run; `--config` takes it back.\n\n{}\n\
+         # Where and on what it ran, for the record; `--config` skips this.\n{tail}",
+        configuration::to_toml(config)?
+    ))
+}
+
+/// The `[run]` table of an output folder's config.toml, `None` without the file.
+pub fn read_run(out: &Path) -> Result<Option<RunRecord>> {
+    #[derive(Deserialize)]
+    struct File {
+        run: RunRecord,
+    }
+    let path = out.join("config.toml");
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let text = std::fs::read_to_string(&path)
+        .with_context(|| format!("{}: cannot be read", path.display()))?;
+    let file: File = toml::from_str(&text)
+        .with_context(|| format!("{}: found no valid [run] table", path.display()))?;
+    Ok(Some(file.run))
+}

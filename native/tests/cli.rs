@@ -1,0 +1,424 @@
+//! The program as people run it: exit codes, messages, and the files of an output folder.
+use serde_json::Value;
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output},
+    sync::OnceLock,
+};
+use tempfile::TempDir;
+
+const FRAMES: usize = 6;
+
+/// A run small enough for a test: coarse field, few rays, few iterations.
+const TINY: [&str; 26] = [
+    "--preset",
+    "fast",
+    "--engine",
+    "cpu",
+    "--set",
+    "mapping.rays=400",
+    "--set",
+    "mapping.iterations=4",
+    "--set",
+    "mapping.first_iterations=60",
+    "--set",
+    "mapping.final_iterations=2",
+    "--set",
+    "mapping.every=2",
+    "--set",
+    "sampling.render_stratified=24",
+    "--set",
+    "sampling.render_surface=8",
+    "--set",
+    "field.surface_fine_m=0.06",
+    "--set",
+    "mesh.min_component_triangles=1",
+    "--mesh-resolution",
+    "0.1",
+    "--render-every",
+    "4",
+];
+
+fn mte_slam(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_mte-slam"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .expect("the program starts")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn succeed(folder: &Path, arguments: &[&str]) -> Output {
+    let output = mte_slam(folder, arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
+    output
+}
+
+/// Run something that must fail with `code` and a message that holds all of `parts`, and must
+/// leave no output folder `out`.
+fn fail(folder: &Path, arguments: &[&str], code: i32, parts: &[&str]) {
+    let output = mte_slam(folder, arguments);
+    let message = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {message}");
+    for part in parts {
+        assert!(message.contains(part), "{arguments:?}: no {part:?} in {message:?}");
+    }
+    assert!(!message.contains("panicked"), "{message}");
+    assert!(output.stdout.is_empty(), "{arguments:?}: {}", text(&output.stdout));
+    assert!(!folder.join("out").exists(), "{arguments:?} left something behind");
+}
+
+struct Shared {
+    folder: TempDir,
+    json: String,
+}
+
+/// One demo run and one written sequence that several tests look at.
+fn shared() -> &'static Shared {
+    static SHARED: OnceLock<Shared> = OnceLock::new();
+    SHARED.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let frames = FRAMES.to_string();
+        let mut demo = vec!["demo", "--json", "--frames", &frames, "--width", "64"];
+        demo.extend(["--seed", "5", "--out", "demo"]);
+        demo.extend(TINY);
+        let json = text(&succeed(folder.path(), &demo).stdout);
+        succeed(folder.path(), &["synth", "room", "--frames", &frames, "--width", "64"]);
+        Shared { folder, json }
+    })
+}
+
+/// A copy of the written sequence, to be spoiled.
+fn recording() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    copy(&shared().folder.path().join("room"), &folder.path().join("room"));
+    folder
+}
+
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let target = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            copy(&entry.path(), &target);
+        } else {
+            fs::copy(entry.path(), target).unwrap();
+        }
+    }
+}
+
+fn run_arguments<'a>(extra: &[&'a str]) -> Vec<&'a str> {
+    let mut arguments = vec!["run", "room", "--out", "out"];
+    arguments.extend(TINY);
+    arguments.extend(extra);
+    arguments
+}
+
+fn read(path: PathBuf) -> String {
+    fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(folder)
+        .unwrap()
+        .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn demo_writes_every_file_and_they_can_be_read() {
+    let out = shared().folder.path().join("demo");
+    assert_eq!(
+        names(&out),
+        [
+            "checkpoint.safetensors",
+            "config.toml",
+            "mesh.glb",
+            "mesh.ply",
+            "mesh_semantic.ply",
+            "metrics.json",
+            "renders",
+            "timings.csv",
+            "trajectory.svg",
+            "trajectory.txt",
+            "trajectory_gt.txt",
+        ]
+    );
+    for file in ["trajectory.txt", "trajectory_gt.txt"] {
+        let text = read(out.join(file));
+        let lines: Vec<&str> = text.lines().filter(|l| !l.starts_with('#')).collect();
+        assert_eq!(lines.len(), FRAMES);
+        for (i, line) in lines.iter().enumerate() {
+            let numbers: Vec<f64> = line.split(' ').map(|n| n.parse().unwrap()).collect();
+            assert_eq!(numbers.len(), 8, "{line}");
+            assert!((numbers[0] - i as f64 / 30.0).abs() < 1e-12, "{line}");
+            let norm: f64 = numbers[4..].iter().map(|q| q * q).sum();
+            assert!((norm - 1.0).abs() < 1e-9, "{line}");
+        }
+    }
+    let timings = read(out.join("timings.csv"));
+    assert_eq!(timings.lines().count(), FRAMES + 1);
+    assert!(timings.lines().nth(1).unwrap().ends_with(",first"), "{timings}");
+    let svg = read(out.join("trajectory.svg"));
+    assert!(svg.starts_with("<svg") && svg.contains("ATE RMSE") && svg.contains("[m]"));
+    for file in ["mesh.ply", "mesh_semantic.ply"] {
+        let ply = fs::read(out.join(file)).unwrap();
+        assert!(ply.starts_with(b"ply\nformat binary_little_endian 1.0\n"), "{file}");
+    }
+    assert!(fs::read(out.join("mesh.glb")).unwrap().starts_with(b"glTF"));
+    let mut pictures = Vec::new();
+    for frame in ["000000", "000004"] {
+        for kind in ["class", "color", "depth", "sheet"] {
+            let name = format!("{frame}.{kind}.png");
+            let image = image::open(out.join("renders").join(&name)).unwrap();
+            if kind != "sheet" {
+                assert_eq!((image.width(), image.height()), (64, 48), "{name}");
+                let deep = image.color() == image::ColorType::L16;
+                assert_eq!(deep, kind != "color", "{name}");
+            }
+            pictures.push(name);
+        }
+    }
+    assert_eq!(names(&out.join("renders")), pictures);
+}
+
+#[test]
+fn json_goes_to_stdout_alone_and_equals_the_file() {
+    let shared = shared();
+    assert_eq!(shared.json, read(shared.folder.path().join("demo/metrics.json")));
+    let json: Value = serde_json::from_str(&shared.json).unwrap();
+    for section in ["trajectory", "depth", "color", "semantics", "mesh", "time", "memory"] {
+        assert!(json[section]["protocol"].is_string(), "{section}: {json:#}");
+    }
+    assert!(json["trajectory"]["aligned_cm"]["rmse"].as_f64().unwrap().is_finite());
+    assert!(json["memory"]["device_bytes"].as_u64().unwrap() > 0);
+    assert_eq!(json["engine"]["kind"], "cpu");
+    assert_eq!(json["configuration"]["seed"], 5);
+    assert!(json["lost_frames"].is_array());
+}
+
+#[test]
+fn the_written_configuration_repeats_the_run_byte_for_byte() {
+    let shared = shared().folder.path();
+    let folder = tempfile::tempdir().unwrap();
+    let config = shared.join("demo/config.toml");
+    let frames = FRAMES.to_string();
+    let mut again = vec!["demo", "-q", "--frames", &frames, "--width", "64", "--engine", "cpu"];
+    again.extend(["--config", config.to_str().unwrap(), "--out", "again"]);
+    again.extend(["--no-mesh", "--render-every", "0"]);
+    let output = succeed(folder.path(), &again);
+    assert!(output.stdout.is_empty() && output.stderr.is_empty(), "-q is quiet");
+    for file in ["trajectory.txt", "checkpoint.safetensors"] {
+        let (a, b) = (shared.join("demo").join(file), folder.path().join("again").join(file));
+        assert!(fs::read(a).unwrap() == fs::read(b).unwrap(), "{file} differs");
+    }
+    let json: Value =
+        serde_json::from_str(&read(folder.path().join("again/metrics.json"))).unwrap();
+    assert_eq!(json["absent"]["mesh"], "--no-mesh was given");
+    assert_eq!(json["absent"]["depth"], "no frame was rendered");
+}
+
+#[test]
+fn eval_mesh_and_render_work_from_the_files_of_a_run() {
+    let folder = recording();
+    // An output folder of an earlier run is used again.
+    for _ in 0..2 {
+        let mut arguments = vec!["run", "room", "--out", "demo", "-q"];
+        arguments.extend(TINY);
+        succeed(folder.path(), &arguments);
+    }
+    let demo = folder.path().join("demo");
+    let eval = text(&succeed(folder.path(), &["eval", "demo", "room", "--json"]).stdout);
+    let (eval, run): (Value, Value) = (
+        serde_json::from_str(&eval).unwrap(),
+        serde_json::from_str(&read(demo.join("metrics.json"))).unwrap(),
+    );
+    let close = |path: &[&str], tolerance: f64| {
+        let get = |v: &Value| path.iter().fold(v.clone(), |v, k| v[k].clone()).as_f64().unwrap();
+        let (a, b) = (get(&eval), get(&run));
+        assert!((a - b).abs() <= tolerance, "{path:?}: {a} from files, {b} in the run");
+    };
+    close(&["trajectory", "aligned_cm", "rmse"], 1e-4);
+    // Depth pictures hold whole millimetres.
+    close(&["depth", "l1_cm"], 0.1);
+    close(&["color", "mean_of_psnr_db"], 1e-6);
+    close(&["semantics", "miou_percent"], 1e-6);
+    close(&["mesh", "point_to_surface", "accuracy_cm"], 0.05);
+    assert!(demo.join("eval.json").is_file());
+
+    let before = fs::read(demo.join("mesh.ply")).unwrap();
+    succeed(folder.path(), &["mesh", "demo", "--resolution", "0.08", "--engine", "cpu"]);
+    assert!(fs::read(demo.join("mesh.ply")).unwrap().len() > before.len());
+    let rendered = demo.join("renders/000004.color.png");
+    let first = fs::read(&rendered).unwrap();
+    succeed(folder.path(), &["render", "demo", "--frame", "4", "--engine", "cpu"]);
+    assert!(fs::read(&rendered).unwrap() == first, "the restored map renders the same");
+    succeed(folder.path(), &["render", "demo", "--frame", "5", "--engine", "cpu"]);
+    assert!(demo.join("renders/000005.depth.png").is_file());
+    let range: [&str; 2] = ["found 77", "6 frames"];
+    fail(folder.path(), &["render", "demo", "--frame", "77", "--engine", "cpu"], 1, &range);
+}
+
+#[test]
+fn wrong_command_lines_are_usage_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let f = folder.path();
+    fs::create_dir(f.join("room")).unwrap();
+    let demo = |extra: &[&'static str]| -> Vec<&'static str> {
+        let mut v =
+            vec!["demo", "--frames", "2", "--width", "32", "--engine", "cpu", "--out", "out"];
+        v.extend(extra);
+        v
+    };
+    fail(f, &[], 2, &["Usage"]);
+    fail(f, &["fly"], 2, &["unrecognized subcommand"]);
+    fail(f, &demo(&["--set", "mapping.iteration=3"]), 2, &["mapping.iterations", "Did you mean"]);
+    fail(f, &demo(&["--set", "mapping.iterations=many"]), 2, &["found string", "expected integer"]);
+    fail(f, &demo(&["--set", "mapping.rays=0"]), 2, &["mapping.rays", "found 0"]);
+    fail(f, &demo(&["--set", "mapping"]), 2, &["KEY=VALUE"]);
+    fail(f, &demo(&["--set", "tracking.tracker=laser"]), 2, &["tracking.tracker", "laser"]);
+    fail(f, &demo(&["--preset", "warp"]), 2, &["found `warp`", "fast, replica, scannet, tum"]);
+    fail(f, &demo(&["--config", "none.toml"]), 2, &["none.toml", "cannot be read"]);
+    fs::write(f.join("bad.toml"), "[mapping]\nrays = \"x\"\n").unwrap();
+    fail(f, &demo(&["--config", "bad.toml"]), 2, &["bad.toml", "mapping.rays", "expected integer"]);
+    fs::write(f.join("broken.toml"), "[mapping\n").unwrap();
+    fail(f, &demo(&["--config", "broken.toml"]), 2, &["broken.toml", "not TOML"]);
+    fail(f, &demo(&["--adapter", "x"]), 2, &["--adapter x", "--engine cpu"]);
+    for bad in [["--scale", "0"], ["--scale", "nan"], ["--stride", "0"], ["--frames", "0"]] {
+        fail(f, &["run", "room", "--out", "out", bad[0], bad[1]], 2, &[bad[0], "expected"]);
+    }
+    fail(f, &["mesh", "out", "--resolution", "0"], 2, &["resolution"]);
+}
+
+#[test]
+fn outputs_that_cannot_be_are_refused_before_any_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let f = folder.path();
+    fs::write(f.join("file"), "x").unwrap();
+    fs::create_dir(f.join("thesis")).unwrap();
+    fs::write(f.join("thesis/chapter.tex"), "x").unwrap();
+    let demo = |out: &'static str| {
+        vec!["demo", "--frames", "2", "--width", "32", "--engine", "cpu", "--out", out]
+    };
+    fail(f, &demo("file"), 1, &["file", "expected a folder"]);
+    fail(f, &demo("file/deeper"), 1, &["file/deeper", "cannot be written", "--out"]);
+    fail(f, &demo("thesis"), 1, &["chapter.tex", "--force"]);
+    assert_eq!(names(&f.join("thesis")), ["chapter.tex"]);
+    assert_eq!(names(f), ["file", "thesis"]);
+    fail(f, &["synth", "thesis", "--frames", "2", "--width", "32"], 1, &["thesis", "empty folder"]);
+    for command in [vec!["mesh", "thesis"], vec!["render", "thesis", "--frame", "0"]] {
+        fail(f, &command, 1, &["checkpoint.safetensors", "cannot be read"]);
+    }
+}
+
+#[test]
+fn an_adapter_that_is_not_there_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments =
+        ["demo", "--frames", "2", "--width", "32", "--out", "out", "--adapter", "No Such Card"];
+    fail(folder.path(), &arguments, 1, &["No Such Card", "mte-slam info"]);
+}
+
+#[test]
+fn recordings_that_are_not_there_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let f = folder.path();
+    fail(f, &run_arguments(&[]), 1, &["room"]);
+    fs::create_dir(f.join("room")).unwrap();
+    fail(f, &run_arguments(&[]), 1, &["room", "no known layout"]);
+    fs::write(f.join("room/notes.txt"), "x").unwrap();
+    fail(f, &run_arguments(&["--layout", "tum"]), 1, &["room", "rgb.txt"]);
+    fail(f, &run_arguments(&["--layout", "paper"]), 2, &["paper", "replica", "tum", "7scenes"]);
+    fail(f, &["eval", "nowhere", "room"], 1, &["nowhere"]);
+    fail(f, &run_arguments(&["--labels", "segmented"]), 1, &["segmented"]);
+}
+
+/// Spoil one file of a good recording, and see the run fail with what is wrong in which file.
+fn spoiled(file: &str, change: impl Fn(Vec<u8>) -> Vec<u8>, extra: &[&str], parts: &[&str]) {
+    let folder = recording();
+    let path = folder.path().join("room").join(file);
+    fs::write(&path, change(fs::read(&path).unwrap())).unwrap();
+    let mut parts = parts.to_vec();
+    parts.push(Path::new(file).file_name().unwrap().to_str().unwrap());
+    fail(folder.path(), &run_arguments(extra), 1, &parts);
+}
+
+#[test]
+fn spoiled_recordings_fail_with_file_and_frame_and_leave_nothing() {
+    let half = |mut bytes: Vec<u8>| {
+        bytes.truncate(bytes.len() / 2);
+        bytes
+    };
+    spoiled("results/depth000003.png", half, &[], &["frame 3"]);
+    spoiled("results/frame000002.png", half, &[], &["frame 2"]);
+    spoiled("results/depth000001.png", |_| Vec::new(), &[], &["frame 1"]);
+    let two_lines = |bytes: Vec<u8>| {
+        text(&bytes).lines().take(2).map(|l| format!("{l}\n")).collect::<String>().into_bytes()
+    };
+    spoiled("traj.txt", two_lines, &[], &["found 2", "6"]);
+    let other_size = |bytes: Vec<u8>| {
+        let image = image::load_from_memory(&bytes).unwrap().crop_imm(0, 0, 32, 32);
+        let mut png = std::io::Cursor::new(Vec::new());
+        image.write_to(&mut png, image::ImageFormat::Png).unwrap();
+        png.into_inner()
+    };
+    spoiled("results/depth000002.png", other_size, &[], &["32x32", "64x48", "frame 2"]);
+    spoiled("cam_params.json", |_| b"{".to_vec(), &[], &["cam_params.json"]);
+    let folder = recording();
+    fs::remove_file(folder.path().join("room/results/depth000004.png")).unwrap();
+    fail(folder.path(), &run_arguments(&[]), 1, &["frame000004.png has no depth image"]);
+}
+
+#[test]
+fn a_true_mesh_that_is_none_is_an_error() {
+    spoiled("mesh.ply", |_| b"not a mesh".to_vec(), &[], &["mesh.ply"]);
+    let folder = recording();
+    fail(folder.path(), &run_arguments(&["--mesh", "none.ply"]), 1, &["none.ply"]);
+}
+
+#[test]
+fn frames_without_depth_or_pose_do_not_stop_a_run() {
+    let folder = recording();
+    let room = folder.path().join("room");
+    // Frame 3: no depth at all; frame 2: a pose of -inf, which evaluation masks.
+    let depth = room.join("results/depth000003.png");
+    let empty = image::ImageBuffer::<image::Luma<u16>, Vec<u16>>::new(64, 48);
+    empty.save(&depth).unwrap();
+    let poses = read(room.join("traj.txt"));
+    let poses: Vec<String> = poses
+        .lines()
+        .enumerate()
+        .map(|(i, l)| if i == 2 { vec!["-inf"; 16].join(" ") } else { l.to_owned() })
+        .collect();
+    fs::write(room.join("traj.txt"), poses.join("\n") + "\n").unwrap();
+    let output = succeed(folder.path(), &run_arguments(&["--json", "--no-mesh"]));
+    let json: Value = serde_json::from_str(&text(&output.stdout)).unwrap();
+    assert_eq!(json["trajectory"]["pairs"], FRAMES - 1, "{json:#}");
+    assert_eq!(json["lost_frames"], serde_json::json!([3]), "{json:#}");
+    assert_eq!(read(folder.path().join("out/trajectory.txt")).lines().count(), FRAMES + 1);
+}
+
+#[test]
+fn help_and_information_work_without_anything() {
+    let folder = tempfile::tempdir().unwrap();
+    let f = folder.path();
+    for command in ["demo", "run", "eval", "mesh", "render", "synth", "info", "bench", "shaders"] {
+        let help = text(&succeed(f, &[command, "--help"]).stdout);
+        assert!(help.contains("Usage:"), "{help}");
+    }
+    let info: Value = serde_json::from_slice(&succeed(f, &["info", "--json"]).stdout).unwrap();
+    assert!(info["adapters"].is_array());
+    let version = text(&succeed(f, &["--version"]).stdout);
+    assert!(version.starts_with("mte-slam "), "{version}");
+    succeed(f, &["shaders", "wgsl"]);
+    let shaders = names(&f.join("wgsl"));
+    assert!(shaders.contains(&"adam.wgsl".to_owned()), "{shaders:?}");
+    assert!(!read(f.join("wgsl/adam.wgsl")).contains("#import"));
+}
