@@ -65,7 +65,7 @@ impl Slam {
             return Ok((TrackingStatus::First, true));
         }
         let refined = match self.config.tracking.tracker {
-            Tracker::Align => self.align(frame, &pose).await?,
+            Tracker::Align => self.align(frame, &pose, found.quality.information).await?,
             Tracker::Render => self.render_track(frame, &pose).await?,
             Tracker::Truth => None,
         };
@@ -77,9 +77,15 @@ impl Slam {
         Ok((TrackingStatus::Tracked, found.keyframe.is_some()))
     }
 
-    /// `align`: damped Gauss-Newton against the field, starting and held near the odometry's pose.
+    /// `align`: damped Gauss-Newton against the field, starting at the odometry's pose, which
+    /// weighs as much as its information says.
     /// `None` when a guard refused the result.
-    async fn align(&mut self, frame: &Frame, start: &Pose) -> Result<Option<Pose>, SlamError> {
+    async fn align(
+        &mut self,
+        frame: &Frame,
+        start: &Pose,
+        prior: [[f64; 6]; 6],
+    ) -> Result<Option<Pose>, SlamError> {
         let t = self.config.tracking.clone();
         if t.align_iterations == 0 || t.align_field_weight == 0.0 {
             return Ok(None);
@@ -91,7 +97,7 @@ impl Slam {
         device.upload_pixels(&mut r, &points);
         device.engine.submit(&r)?;
         let guard = Guard { offered: points.len(), ..Guard::default() };
-        let mut solver = gauss_newton::Solver::new(*start, t.align_field_weight, guard);
+        let mut solver = gauss_newton::Solver::new(*start, prior, t.align_field_weight, guard);
         for _ in 0..t.align_iterations {
             let sums = device.align(&solver.candidate(), points.len() as u32).await?;
             if solver.step(&sums) {

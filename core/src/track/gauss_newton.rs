@@ -29,6 +29,8 @@ pub struct Solver {
     best_cost: f64,
     damping: f64,
     weight: f64,
+    /// Information of the start, for left retractions.
+    prior: [[f64; 6]; 6],
     accepted: u32,
     guard: Guard,
     refused: bool,
@@ -45,8 +47,7 @@ pub fn solve6(a: &[[f64; 6]; 6], b: &[f64; 6]) -> Option<[f64; 6]> {
                 s -= l[i][k] * l[j][k];
             }
             if i == j {
-                // Written so that NaN fails.
-                if !(s > 1e-12 * a[i][i].max(1e-300)) {
+                if s.is_nan() || s <= 1e-12 * a[i][i].max(1e-300) {
                     return None;
                 }
                 l[i][i] = num_traits::Float::sqrt(s);
@@ -72,8 +73,9 @@ pub fn solve6(a: &[[f64; 6]; 6], b: &[f64; 6]) -> Option<[f64; 6]> {
 }
 
 impl Solver {
-    /// Starts at a pose. `weight` scales the sums.
-    pub fn new(start: Pose, weight: f64, guard: Guard) -> Solver {
+    /// Starts at a pose known with `prior` information (for left retractions); `weight` scales the
+    /// device's sums against it.
+    pub fn new(start: Pose, prior: [[f64; 6]; 6], weight: f64, guard: Guard) -> Solver {
         Solver {
             start,
             best: start,
@@ -81,6 +83,7 @@ impl Solver {
             best_cost: f64::INFINITY,
             damping: 1e-4,
             weight,
+            prior,
             accepted: 0,
             guard,
             refused: false,
@@ -103,7 +106,11 @@ impl Solver {
             self.refused = self.accepted == 0;
             return true;
         }
-        let cost = (sums[27] + sums[28]) / points;
+        let away = self.away();
+        let pull: [f64; 6] =
+            core::array::from_fn(|i| (0..6).map(|j| self.prior[i][j] * away[j]).sum());
+        let prior_cost: f64 = (0..6).map(|i| away[i] * pull[i]).sum();
+        let cost = self.weight * (sums[27] + sums[28]) / points + prior_cost / points;
         if cost < self.best_cost {
             let gain = self.best_cost - cost;
             self.best = self.candidate;
@@ -114,12 +121,12 @@ impl Solver {
             let mut k = 0;
             for a in 0..6 {
                 for b in a..6 {
-                    h[a][b] = sums[k] * self.weight;
+                    h[a][b] = sums[k] * self.weight + self.prior[a][b];
                     h[b][a] = h[a][b];
                     k += 1;
                 }
             }
-            let g = core::array::from_fn(|i| -sums[21 + i] * self.weight);
+            let g = core::array::from_fn(|i| -sums[21 + i] * self.weight - pull[i]);
             self.last = Some((h, g));
             if gain < 1e-4 * cost {
                 return true;
@@ -142,6 +149,19 @@ impl Solver {
         x.iter().all(|v| v.abs() < 1e-6)
     }
 
+    /// The candidate as a retraction of the start.
+    fn away(&self) -> [f64; 6] {
+        let v = self.candidate.translation - self.start.translation;
+        let q = self.candidate.rotation.mul_mat3(&self.start.rotation.transpose());
+        // The skew part is the rotation vector to second order, and corrections are small.
+        let w = [
+            0.5 * (q.y_axis.z - q.z_axis.y),
+            0.5 * (q.z_axis.x - q.x_axis.z),
+            0.5 * (q.x_axis.y - q.y_axis.x),
+        ];
+        [v.x, v.y, v.z, w[0], w[1], w[2]]
+    }
+
     /// The refined pose, or `None` when a guard refused it.
     pub fn result(&self) -> Option<Pose> {
         let change = self.start.inverse().compose(&self.best);
@@ -154,6 +174,27 @@ impl Solver {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn ends_between_prior_and_field() {
+        // A field that wants x = 0.01 m as strongly as the prior wants 0.
+        let mut prior = [[0.0; 6]; 6];
+        (0..6).for_each(|i| prior[i][i] = 100.0);
+        let guard = Guard { offered: 100, ..Guard::default() };
+        let mut solver = Solver::new(Pose::IDENTITY, prior, 1.0, guard);
+        for _ in 0..20 {
+            let e = solver.candidate().translation.x - 0.01;
+            let mut sums = [0.0; ALIGN_ROW];
+            sums[0] = 100.0;
+            sums[21] = 100.0 * e;
+            sums[27] = 100.0 * e * e;
+            sums[29] = 100.0;
+            if solver.step(&sums) {
+                break;
+            }
+        }
+        assert!((solver.result().unwrap().translation.x - 0.005).abs() < 1e-5);
+    }
 
     #[test]
     fn solves_and_refuses() {

@@ -54,6 +54,8 @@ pub struct Quality {
     pub conditioning: f64,
     /// See [`Alignment::unconstrained`].
     pub unconstrained: usize,
+    /// See [`Alignment::information`].
+    pub information: [[f64; 6]; 6],
     /// Keyframes used.
     pub references: usize,
 }
@@ -296,6 +298,7 @@ impl Odometer {
             photometric_rmse: fit.photometric_rmse,
             conditioning: fit.conditioning(),
             unconstrained: fit.unconstrained,
+            information: fit.information,
             references: used.len(),
         };
         self.last = Some((current, pose));
