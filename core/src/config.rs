@@ -14,6 +14,19 @@ pub enum Tracker {
     Truth,
 }
 
+/// When mapping refines the poses of its window, too.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RefinePoses {
+    /// With the `render` tracker only: `align` starts from poses that are better than Adam's steps
+    /// (measured: room-11 0.04 cm without, 0.13 cm with).
+    Auto,
+    /// Always, but with true poses.
+    On,
+    /// Never.
+    Off,
+}
+
 /// Everything that decides a run beside its input.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -145,7 +158,7 @@ pub struct MappingConfig {
     /// Frames an iteration draws rays from (with the current one).
     pub window: u32,
     /// Refine the poses of the window, too.
-    pub refine_poses: bool,
+    pub refine_poses: RefinePoses,
     /// Adam step of the poses' translation \[m\].
     pub rate_translation_m: f64,
     /// Adam step of the poses' rotation \[rad\].
@@ -270,9 +283,9 @@ impl Default for MappingConfig {
             rate_planes: 5e-3,
             rate_decoders: 1e-3,
             window: 8,
-            refine_poses: true,
-            rate_translation_m: 1e-3,
-            rate_rotation_rad: 1e-3,
+            refine_poses: RefinePoses::Auto,
+            rate_translation_m: 5e-4,
+            rate_rotation_rad: 5e-4,
             decoder_stride: 8,
             min_gradient: 2e-4,
         }

@@ -1,7 +1,7 @@
 //! Adding a frame to the map: bounds, keyframes, windows, optimisation, corrected poses.
 use super::{Losses, Observation, Slam, SlamError};
 use crate::{
-    config::Tracker,
+    config::{RefinePoses, Tracker},
     device::{Batch, Device, Rates, WINDOW_MAX},
     field::FieldShape,
     frame::{Bounds, Frame},
