@@ -190,8 +190,12 @@ impl Slam {
         let loss = self.config.loss.clone();
         let seed = self.config.seed;
         let n = self.keyframes.len();
-        let refine =
-            m.refine_poses && self.config.tracking.tracker != Tracker::Truth && n > REFINE_AFTER;
+        let refine = n > REFINE_AFTER
+            && match (m.refine_poses, self.config.tracking.tracker) {
+                (_, Tracker::Truth) | (RefinePoses::Off, _) => false,
+                (RefinePoses::On, _) => true,
+                (RefinePoses::Auto, tracker) => tracker == Tracker::Render,
+            };
         let window_size = (m.window as usize).min(WINDOW_MAX).min(n);
         let keyframes: Vec<(u32, _)> =
             self.keyframes.iter().map(|k| (k.slot, k.world_from_camera)).collect();
