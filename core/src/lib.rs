@@ -6,7 +6,6 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 extern crate alloc;
 
-pub mod bench;
 pub mod camera;
 pub mod classes;
 pub mod config;
