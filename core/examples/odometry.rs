@@ -9,7 +9,12 @@ use mte_slam_core::{
     pose::Pose,
     track::odometry::{Odometer, OdometryConfig, RgbdPyramid},
 };
-use std::{fs, path::Path, time::Instant};
+use std::{
+    fmt::Write as _,
+    fs,
+    path::{Path, PathBuf},
+    time::Instant,
+};
 
 struct Recording {
     camera: Camera,
@@ -175,13 +180,14 @@ fn main() {
         return;
     };
     let mut config = serde_json::to_value(OdometryConfig::default()).expect("config");
-    let (mut only, mut most, mut verbose) = (String::new(), usize::MAX, false);
+    let (mut only, mut most, mut verbose, mut out) = (String::new(), usize::MAX, false, None);
     for arg in args {
         let (key, value) = arg.split_once('=').expect("key=value");
         match key {
             "only" => only = value.into(),
             "frames" => most = value.parse().expect("frames"),
             "verbose" => verbose = value == "1",
+            "out" => out = Some(PathBuf::from(value)),
             _ => {
                 let mut at = &mut config;
                 for part in key.split('.') {
@@ -242,7 +248,24 @@ fn main() {
                 );
             }
         }
+        if let Some(out) = &out {
+            // A line a frame: estimate, then truth, both `world_from_camera`, 3x4 row by row.
+            let mut text = String::new();
+            for ((_, estimate, _), (_, _, truth)) in
+                odometer.trajectory().iter().zip(&recording.frames)
+            {
+                let numbers = [estimate, truth].map(|p| p.to_row_major());
+                for x in numbers.iter().flat_map(|n| &n[..12]) {
+                    let _ = write!(text, "{x} ");
+                }
+                text.push('\n');
+            }
+            fs::write(out.join(format!("{name}.txt")), text).expect("out");
+        }
         let last: Vec<DVec3> = odometer.trajectory().iter().map(|t| t.1.translation).collect();
+        if verbose {
+            println!("colour registration {:?}", odometer.colour_registration());
+        }
         let (rmse, max) = ate(&last, &truth);
         let (rmse_online, _) = ate(&online, &truth);
         println!(

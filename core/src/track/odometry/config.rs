@@ -122,6 +122,9 @@ pub struct OdometryConfig {
     pub pose_graph: bool,
     /// Keyframes a new one is linked with in the graph.
     pub graph_links: usize,
+    /// Number of keyframe pairs from which the registration of colour to depth is estimated;
+    /// 0: take them as registered.
+    pub registration_pairs: usize,
 }
 
 impl Default for OdometryConfig {
@@ -142,6 +145,7 @@ impl Default for OdometryConfig {
             doubtful_inlier_ratio: 0.85,
             pose_graph: false,
             graph_links: 6,
+            registration_pairs: 12,
         }
     }
 }

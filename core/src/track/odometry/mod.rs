@@ -5,12 +5,14 @@
 //! align with, notices loss and recovers; [`PoseGraph`] makes keyframe poses agree with each other.
 //! A frame costs milliseconds; nothing here needs a device.
 mod align;
+mod calibration;
 mod config;
 mod features;
 mod linear;
 mod odometer;
 mod pose_graph;
 mod pyramid;
+mod registration;
 mod residuals;
 mod thumbnail;
 
@@ -19,6 +21,7 @@ pub use config::{AlignConfig, OdometryConfig, PyramidConfig};
 pub use odometer::{Keyframe, LostReason, Odometer, OdometryResult, Quality};
 pub use pose_graph::{Edge, PoseGraph};
 pub use pyramid::RgbdPyramid;
+pub use registration::ColourRegistration;
 
 #[cfg(test)]
 mod tests;

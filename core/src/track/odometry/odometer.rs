@@ -2,10 +2,12 @@
 use super::{
     OdometryError,
     align::{Alignment, Reference, align_levels},
+    calibration::Calibration,
     config::OdometryConfig,
     features::Features,
     pose_graph::{Edge, PoseGraph},
     pyramid::RgbdPyramid,
+    registration::ColourRegistration,
     thumbnail::Thumbnail,
 };
 use crate::pose::Pose;
@@ -21,9 +23,9 @@ pub struct Keyframe {
     pub frame: usize,
     /// Its present pose.
     pub world_from_camera: Pose,
-    pyramid: RgbdPyramid,
-    thumbnail: Thumbnail,
-    features: Features,
+    pub(super) pyramid: RgbdPyramid,
+    pub(super) thumbnail: Thumbnail,
+    pub(super) features: Features,
 }
 
 /// Why a frame counts as lost.
@@ -89,8 +91,8 @@ struct Tracked {
 /// Frame-by-frame RGB-D odometry against keyframes.
 #[derive(Debug)]
 pub struct Odometer {
-    config: OdometryConfig,
-    keyframes: Vec<Keyframe>,
+    pub(super) config: OdometryConfig,
+    pub(super) keyframes: Vec<Keyframe>,
     next_id: usize,
     last: Option<(RgbdPyramid, Pose)>,
     /// `last_from_previous^-1` motion of the last step in the camera frame.
@@ -98,8 +100,9 @@ pub struct Odometer {
     lost_streak: usize,
     tracked: Vec<Tracked>,
     /// Keyframe poses also of dropped keyframes.
-    poses: BTreeMap<usize, Pose>,
+    pub(super) poses: BTreeMap<usize, Pose>,
     edges: Vec<Edge>,
+    pub(super) calibration: Calibration,
 }
 
 impl Odometer {
@@ -115,12 +118,19 @@ impl Odometer {
             tracked: Vec::new(),
             poses: BTreeMap::new(),
             edges: Vec::new(),
+            calibration: Calibration::default(),
         }
     }
 
     /// The settings.
     pub fn config(&self) -> &OdometryConfig {
         &self.config
+    }
+
+    /// Where the colour image has been found to lie on the depth image; the identity as long as
+    /// nothing speaks against it.
+    pub fn colour_registration(&self) -> ColourRegistration {
+        self.calibration.registration
     }
 
     /// The keyframes that are kept, oldest first.
@@ -134,6 +144,7 @@ impl Odometer {
         if !pose.is_finite() {
             return false;
         }
+        self.calibration.corrected = true;
         let Some(k) = self.keyframes.iter_mut().find(|k| k.id == id) else { return false };
         let change = pose.compose(&k.world_from_camera.inverse());
         k.world_from_camera = pose;
@@ -151,6 +162,7 @@ impl Odometer {
         if !pose.is_finite() {
             return;
         }
+        self.calibration.corrected = true;
         if let Some((_, last)) = &mut self.last {
             let before = *last;
             // The step before it grows by the correction.
@@ -214,9 +226,10 @@ impl Odometer {
     /// for a first frame without depth. A later one is reported as lost.
     pub fn track(
         &mut self,
-        current: RgbdPyramid,
+        mut current: RgbdPyramid,
         prediction: Option<Pose>,
     ) -> Result<OdometryResult, OdometryError> {
+        current.register(&self.calibration.registration);
         let predicted = prediction.unwrap_or_else(|| self.predict());
         if !predicted.is_finite() {
             return Err(OdometryError::BadPose { frame: current.frame });
@@ -283,6 +296,8 @@ impl Odometer {
         self.lost_streak = 0;
         let keyframe = if self.wants_keyframe(&fit, &pose, &current) {
             let id = self.add_keyframe(&current, pose, &used);
+            self.calibrate();
+            current.register(&self.calibration.registration);
             pose = self.poses[&id];
             Some(id)
         } else {

@@ -1,6 +1,6 @@
 //! A frame as the alignment wants it: intensity with gradients, depth, local planes, at several
 //! sizes.
-use super::{OdometryError, config::PyramidConfig};
+use super::{OdometryError, config::PyramidConfig, registration::ColourRegistration};
 use crate::{camera::Camera, frame::Frame, pose::Pose};
 use alloc::{vec, vec::Vec};
 use glam::DVec3;
@@ -47,6 +47,10 @@ pub struct RgbdPyramid {
     pub(super) median_depth_m: f64,
     /// Shape of depth noise, see [`PyramidConfig`].
     pub(super) noise: [f32; 2],
+    /// Intensity as recorded, full size.
+    pub(super) intensity: Vec<f32>,
+    /// What `intensity` has been resampled with for the levels.
+    pub(super) registration: ColourRegistration,
 }
 
 impl RgbdPyramid {
@@ -106,6 +110,7 @@ impl RgbdPyramid {
     ) -> RgbdPyramid {
         let noise = [config.depth_noise_m as f32, config.depth_noise_per_m2 as f32];
         let mut camera = *camera;
+        let recorded = intensity.clone();
         let mut levels = Vec::new();
         loop {
             let (w, h) = (camera.width as usize, camera.height as usize);
@@ -126,7 +131,49 @@ impl RgbdPyramid {
             let k = z.len() / 2;
             f64::from(*z.select_nth_unstable_by(k, f32::total_cmp).1)
         };
-        RgbdPyramid { frame, levels, median_depth_m, noise }
+        RgbdPyramid {
+            frame,
+            levels,
+            median_depth_m,
+            noise,
+            intensity: recorded,
+            registration: ColourRegistration::default(),
+        }
+    }
+
+    /// Resample the colour so that it lies on the depth; nothing to do when it already is so.
+    pub(super) fn register(&mut self, registration: &ColourRegistration) {
+        if self.registration == *registration {
+            return;
+        }
+        self.registration = *registration;
+        let (w, h) = (self.levels[0].width, self.levels[0].height);
+        let scale = registration.scale as f32;
+        let (cx, cy) = (self.levels[0].cx, self.levels[0].cy);
+        let mut image = vec![0.0f32; w * h];
+        for v in 0..h {
+            let y = (cy + scale * (v as f32 - cy)).clamp(0.0, (h - 1) as f32);
+            let iy = (y as usize).min(h - 2);
+            let fy = y - iy as f32;
+            for u in 0..w {
+                let x = (cx + scale * (u as f32 - cx)).clamp(0.0, (w - 1) as f32);
+                let ix = (x as usize).min(w - 2);
+                let fx = x - ix as f32;
+                let i = iy * w + ix;
+                let top = self.intensity[i] + fx * (self.intensity[i + 1] - self.intensity[i]);
+                let i = i + w;
+                let bottom = self.intensity[i] + fx * (self.intensity[i + 1] - self.intensity[i]);
+                image[v * w + u] = top + fy * (bottom - top);
+            }
+        }
+        let mut size = (w, h);
+        for (k, level) in self.levels.iter_mut().enumerate() {
+            if k > 0 {
+                image = halve_intensity(&image, size.0, size.1);
+                size = (level.width, level.height);
+            }
+            level.set_intensity(&image);
+        }
     }
 
     /// Number of pixels with usable depth at full size.
@@ -183,7 +230,7 @@ impl RgbdPyramid {
 }
 
 /// 2x2 box: what [`Camera::downscaled`] assumes.
-fn halve_intensity(image: &[f32], w: usize, h: usize) -> Vec<f32> {
+pub(super) fn halve_intensity(image: &[f32], w: usize, h: usize) -> Vec<f32> {
     let (hw, hh) = (w / 2, h / 2);
     let mut out = Vec::with_capacity(hw * hh);
     for v in 0..hh {
@@ -231,6 +278,27 @@ fn halve_depth(depth: &[f32], w: usize, h: usize, noise: [f32; 2]) -> Vec<f32> {
 }
 
 impl Level {
+    /// Replace the intensity and its gradients.
+    fn set_intensity(&mut self, intensity: &[f32]) {
+        let (w, h) = (self.width, self.height);
+        let mut points = self.points.iter_mut();
+        for v in 0..h {
+            for u in 0..w {
+                let i = v * w + u;
+                let (l, r) = (i - usize::from(u > 0), i + usize::from(u + 1 < w));
+                let (t, b) = (i - if v > 0 { w } else { 0 }, i + if v + 1 < h { w } else { 0 });
+                self.texels[i][0] = intensity[i];
+                self.texels[i][1] = 0.5 * (intensity[r] - intensity[l]);
+                self.texels[i][2] = 0.5 * (intensity[b] - intensity[t]);
+                if self.texels[i][3] > 0.0
+                    && let Some(point) = points.next()
+                {
+                    point.intensity = intensity[i];
+                }
+            }
+        }
+    }
+
     fn new(
         camera: &Camera,
         intensity: &[f32],
