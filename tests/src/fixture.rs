@@ -126,7 +126,11 @@ pub fn frame(index: u32) -> Frame {
             4 => raw * 3 / 2,
             _ => raw,
         });
-        labels.push(if wall >= CLASSES as u8 || random.bits() % 8 == 0 { 255 } else { wall });
+        labels.push(if wall >= CLASSES as u8 || random.bits().is_multiple_of(8) {
+            255
+        } else {
+            wall
+        });
         let mut channel = |base: u8| base.wrapping_mul(40) / 2 + (random.bits() % 60) as u8 + 20;
         color.push([channel(wall), channel(wall + 2), channel(5 - wall)]);
     }

@@ -190,7 +190,7 @@ fn check(problem: &mut Problem, tensor: Trained, gradient: &[f32], part: Range<u
     let norm = part.clone().map(|i| gradient[i] * gradient[i]).sum::<f32>().sqrt();
     let mut random = TestRandom(9);
     let signs: Vec<f32> =
-        gradient.iter().map(|_| if random.bits() % 2 == 0 { -1.0 } else { 1.0 }).collect();
+        gradient.iter().map(|_| if random.bits().is_multiple_of(2) { -1.0 } else { 1.0 }).collect();
     for (which, along) in [("gradient", false), ("mixed", true)] {
         let direction = |i: usize| if along { signs[i] } else { 1.0 } * gradient[i] / norm;
         let expected: f64 =
@@ -319,7 +319,9 @@ fn poses_of_the_window() {
             let norm = gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
             assert!(norm > 1e-3, "{name}: no gradient at frame {slot}");
             for k in 0..6 {
-                let h = 5e-4;
+                // At 5e-4 a twentieth of the samples crosses a cell (errors of 8e-2); they shrink
+                // with the step to 3e-3 here, where rounding starts to show.
+                let h = 1.2e-5;
                 let mut at = |h: f64| {
                     let mut twist = [0.0; 6];
                     twist[k] = h;
@@ -330,7 +332,7 @@ fn poses_of_the_window() {
                 place(&mut problem, slot, &fixture::pose(slot));
                 let error = (found - gradient[k]).abs() / norm;
                 println!("{name} {slot} {k}: {:.6} {found:.6} {error:.1e}", gradient[k]);
-                assert!(error < 0.02, "{name}, frame {slot}, {k}: {} {found}", gradient[k]);
+                assert!(error < 0.012, "{name}, frame {slot}, {k}: {} {found}", gradient[k]);
             }
         }
     }
@@ -380,7 +382,7 @@ fn rays_without_depth_teach_colour() {
         moved.buffers.insert("planes_geometry", f32_words(along));
         total(&mut moved)
     };
-    let found = (at(1e-2) - at(-1e-2)) / 2e-2;
+    let found = (at(5e-4) - at(-5e-4)) / 1e-3;
     println!("planes {norm} {found}");
     assert!((found - norm).abs() < 0.02 * norm, "planes: {norm} {found}");
 
@@ -405,7 +407,7 @@ fn rays_without_depth_teach_colour() {
             moved.run(&mut Engine::cpu(), &SAMPLE_RAYS);
             total(&mut moved)
         };
-        let found = (at(1e-3) - at(-1e-3)) / 2e-3;
+        let found = (at(1.2e-5) - at(-1.2e-5)) / 2.4e-5;
         println!("pose {k} {} {found}", pose_gradient[k]);
         assert!(
             (found - pose_gradient[k]).abs() < 0.03 * norm,
