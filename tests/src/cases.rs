@@ -197,6 +197,7 @@ pub fn cases(kernel: &str) -> Vec<Case> {
         "mask_rays" => vec![
             case("tracking", &MASK_RAYS, &before(&MASK_RAYS, &tracking), &[]),
             many_outliers(&tracking),
+            threshold(&tracking),
         ],
         "composite_backward" => vec![
             chained("poses", &COMPOSITE_BACKWARD, &usual, &["distance_gradient"]),
@@ -248,20 +249,27 @@ pub fn cases(kernel: &str) -> Vec<Case> {
     }
 }
 
-/// A third of the rays far off the others' depth error.
-fn many_outliers(o: &Options) -> Case {
+fn with_errors(name: &'static str, o: &Options, error: impl Fn(usize) -> f32) -> Case {
     let mut state = before(&MASK_RAYS, o);
-    let mut random = TestRandom(41);
     let out = state.buffers.get_mut("ray_out").expect("a buffer of the fixture");
     for (i, ray) in out.chunks_exact_mut(RAY_OUT_FLOATS).enumerate() {
-        let error = match i % 6 {
-            0 => 0.0,
-            1 | 2 => random.uniform(0.3, 3.0),
-            _ => random.uniform(0.001, 0.01),
-        };
-        ray[10] = error.to_bits();
+        ray[10] = error(i).to_bits();
     }
-    case("outliers", &MASK_RAYS, &state, &[])
+    case(name, &MASK_RAYS, &state, &[])
+}
+
+/// A third of the rays far off the others' depth error, some without.
+fn many_outliers(o: &Options) -> Case {
+    with_errors("outliers", o, |i| match i % 6 {
+        0 => 0.0,
+        1 | 2 => 0.3 + 0.03 * i as f32,
+        _ => 0.001 + 0.0001 * i as f32,
+    })
+}
+
+/// Half the rays at one error, the others in small steps around ten times that.
+fn threshold(o: &Options) -> Case {
+    with_errors("threshold", o, |i| if i <= 40 { 0.01 } else { 0.08 + 0.001 * (i - 40) as f32 })
 }
 
 fn geometry_weights(o: &Options) -> Vec<Case> {

@@ -51,8 +51,7 @@ fn whole_frame(index: u32) -> Frame {
 }
 
 fn config() -> Config {
-    let mut c = Config::default();
-    c.field = fixture::field_config();
+    let mut c = Config { field: fixture::field_config(), ..Config::default() };
     c.field.sharpness = 4.0;
     c.sampling.stratified = 14;
     c.sampling.surface = 6;
