@@ -471,7 +471,7 @@ fn alignment_to_the_field() {
             };
             let norm = g.iter().map(|x| x * x).sum::<f64>().sqrt();
             for k in 0..6 {
-                let h = 1e-3;
+                let h = 1e-4;
                 let mut at = |h: f64| {
                     let mut twist = [0.0; 6];
                     twist[k] = h;
