@@ -1,4 +1,7 @@
 //! Test support: engines, and the comparison of a kernel's shader with its Rust twin.
+pub mod cases;
+pub mod fixture;
+
 use bytemuck::Pod;
 use mte_slam_core::{
     engine::{Engine, EngineError, GpuOptions},
@@ -44,6 +47,17 @@ pub enum Compare {
     },
     /// Equal bits.
     U32,
+    /// Rows of f32, with `bits` the columns that hold integers. A difference may be `relative`
+    /// times the column's largest magnitude: rounding errors of sums go with their terms, not
+    /// with what is left after they cancel. Every float must be finite.
+    Columns {
+        /// Words a row.
+        row: usize,
+        /// Columns of equal bits.
+        bits: &'static [usize],
+        /// Allowed difference in parts of the column's largest value.
+        relative: f32,
+    },
 }
 
 /// How two engines' results may differ: one entry a binding, in binding order.
@@ -152,9 +166,18 @@ pub fn compare_outputs(
     }
     for (i, compare) in tolerance.0.iter().enumerate() {
         let pairs = || expected[i].iter().zip(&found[i]).enumerate();
-        let differs = |(a, b): (&u32, &u32)| !within(*compare, *a, *b);
-        let first = pairs().find(|(_, pair)| differs(*pair));
-        let count = pairs().filter(|(_, pair)| differs(*pair)).count();
+        let largest = column_maxima(*compare, &expected[i]);
+        let differs = |index: usize, (a, b): (&u32, &u32)| match *compare {
+            Compare::Columns { row, bits, .. } if bits.contains(&(index % row)) => a != b,
+            Compare::Columns { row, relative, .. } => {
+                let (a, b) = (f32::from_bits(*a), f32::from_bits(*b));
+                let close = (a - b).abs() <= relative * largest[index % row];
+                !(close && a.is_finite() && b.is_finite())
+            }
+            _ => !within(*compare, *a, *b),
+        };
+        let first = pairs().find(|(index, pair)| differs(*index, *pair));
+        let count = pairs().filter(|(index, pair)| differs(*index, *pair)).count();
         if let Some((index, (a, b))) = first {
             return Err(Mismatch::Word {
                 kernel: kernel.name,
@@ -169,10 +192,24 @@ pub fn compare_outputs(
     Ok(())
 }
 
+/// Largest finite magnitude of each column.
+fn column_maxima(compare: Compare, words: &[u32]) -> Vec<f32> {
+    let Compare::Columns { row, .. } = compare else { return Vec::new() };
+    let mut largest = vec![0.0_f32; row];
+    for (i, word) in words.iter().enumerate() {
+        let x = f32::from_bits(*word).abs();
+        if x.is_finite() {
+            largest[i % row] = largest[i % row].max(x);
+        }
+    }
+    largest
+}
+
 fn within(compare: Compare, a: u32, b: u32) -> bool {
     match compare {
         _ if a == b => true,
-        Compare::U32 => false,
+        // Columns need their maxima; see `compare_outputs`.
+        Compare::U32 | Compare::Columns { .. } => false,
         Compare::I32 { quanta } => (a as i32).abs_diff(b as i32) <= quanta,
         Compare::F32 { absolute, relative } => {
             let (a, b) = (f32::from_bits(a), f32::from_bits(b));
@@ -186,7 +223,7 @@ fn show(compare: Compare, word: u32) -> String {
     match compare {
         Compare::U32 => format!("{word:#010x}"),
         Compare::I32 { .. } => format!("{}", word as i32),
-        Compare::F32 { .. } => format!("{:e}", f32::from_bits(word)),
+        Compare::F32 { .. } | Compare::Columns { .. } => format!("{:e}", f32::from_bits(word)),
     }
 }
 

@@ -1,0 +1,124 @@
+//! Twenty iterations of mapping, run again, give the same bytes: no sum depends on the order in
+//! which threads or workgroups run.
+use mte_slam_core::{
+    config::{Config, LossConfig},
+    device::{Batch, Device, Rates},
+    engine::Engine,
+    kernels::shared::{FLAG_GUIDED, FLAG_MAP, FLAG_POSE},
+    recording::Recording,
+};
+use mte_slam_tests::{
+    fixture::{self, CLASSES, DEPTH_UNIT_M, FRAMES, Options, State},
+    gpu_engine,
+};
+use pollster::block_on;
+
+const RAYS_PER_FRAME: u32 = 100;
+
+/// All parameters, then poses and their state, after 20 iterations.
+fn map(engine: Engine) -> Vec<Vec<u32>> {
+    let mut config = Config { field: fixture::field_config(), ..Config::default() };
+    (config.sampling.stratified, config.sampling.surface) = (12, 4);
+    (config.mapping.rays, config.tracking.render_rays) = (FRAMES * RAYS_PER_FRAME, 1);
+    config.mapping.decoder_stride = 2;
+    config.keyframes.budget_mib = 1;
+    let camera = fixture::camera();
+    let mut d =
+        Device::new(engine, &config, camera, DEPTH_UNIT_M, CLASSES, fixture::shape()).unwrap();
+    let mut r = Recording::new();
+    // The map starts as free space, which trains no appearance in 20 iterations: start elsewhere.
+    let state = State::new(&Options::default());
+    for (tensor, name) in [
+        (d.geometry, "planes_geometry"),
+        (d.appearance, "planes_appearance"),
+        (d.semantic, "planes_semantic"),
+        (d.decoders, "decoders"),
+    ] {
+        r.upload(tensor.values, 0, &state.buffers[name]);
+    }
+    for slot in 0..FRAMES {
+        d.upload_frame(&mut r, slot, &fixture::frame(slot));
+        d.upload_pose(&mut r, slot, &fixture::pose(slot));
+    }
+    d.upload_window(&mut r, &[(2, true), (0, false), (1, false)]);
+    d.engine.submit(&r).unwrap();
+    let loss = LossConfig::default();
+    for iteration in 0..20 {
+        let batch = Batch {
+            frames: FRAMES,
+            rays_per_frame: RAYS_PER_FRAME,
+            stratified: 12,
+            surface: 4,
+            flags: FLAG_GUIDED | FLAG_MAP | FLAG_POSE,
+            loss: &loss,
+            iteration,
+            first: 0,
+        };
+        let mut r = Recording::new();
+        d.record_forward(&mut r, &batch);
+        d.record_backward(&mut r, &batch);
+        d.record_pose_step(&mut r, &batch, 1e-3, 1e-3, iteration == 0);
+        d.record_step(&mut r, &batch, Rates { planes: 5e-3, decoders: 1e-3 });
+        d.engine.submit(&r).unwrap();
+    }
+    assert_eq!(block_on(d.read_status()).unwrap(), 0, "saturated or not finite");
+    let mut out = Vec::new();
+    for t in [d.geometry, d.appearance, d.semantic, d.decoders] {
+        for buffer in [t.values, t.moment1, t.moment2] {
+            out.push(block_on(d.engine.read(buffer, 0, t.floats)).unwrap());
+        }
+    }
+    for slot in 0..FRAMES {
+        let state = block_on(d.read_pose_state(slot)).unwrap();
+        out.push(state.iter().map(|x| x.to_bits()).collect());
+    }
+    let poses = block_on(d.read_poses(FRAMES)).unwrap();
+    for (slot, pose) in poses.iter().enumerate() {
+        let m = pose.expect("a finite pose").to_row_major();
+        let moved =
+            (0..3).any(|k| (m[4 * k + 3] - fixture::pose(slot as u32).translation[k]).abs() > 1e-4);
+        assert_eq!(moved, slot != 2, "all poses move but the fixed one");
+        out.push(m.iter().flat_map(|x| [x.to_bits() as u32, (x.to_bits() >> 32) as u32]).collect());
+    }
+    out
+}
+
+fn with_threads(threads: usize) -> Vec<Vec<u32>> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    pool.install(|| map(Engine::cpu()))
+}
+
+#[test]
+fn the_cpu_repeats_itself_with_any_number_of_threads() {
+    let first = with_threads(1);
+    for threads in [1, 2, 5] {
+        assert!(with_threads(threads) == first, "{threads} threads");
+    }
+    // The comparison sees the training: planes and decoders have moments.
+    for moments in [1, 4, 7, 10] {
+        assert!(first[moments].iter().any(|word| *word != 0), "{moments}");
+    }
+}
+
+#[test]
+fn the_gpu_repeats_itself() {
+    let Some(engine) = gpu_engine() else { return };
+    let first = map(engine);
+    let Some(engine) = gpu_engine() else { return };
+    let second = map(engine);
+    for (i, (a, b)) in first.iter().zip(&second).enumerate() {
+        let differ = a.iter().zip(b).filter(|(a, b)| a != b).count();
+        assert_eq!(differ, 0, "tensor {i}");
+    }
+    // One training, two engines: not the same bits, but the same steps (Adam's first ones have
+    // the rate's size whatever the gradient, so rounding turns some around).
+    let cpu = map(Engine::cpu());
+    for tensor in [0, 3, 6, 9] {
+        let float = |w: &u32| f64::from(f32::from_bits(*w));
+        let pairs = || cpu[tensor].iter().map(float).zip(first[tensor].iter().map(float));
+        let error = pairs().map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+        let size = pairs().map(|(a, _)| a * a).sum::<f64>();
+        println!("tensor {tensor}: {:.1e}", (error / size).sqrt());
+        assert!(error < 1e-4 * size, "tensor {tensor}: {error} of {size}");
+    }
+}
