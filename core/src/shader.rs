@@ -4,7 +4,7 @@
 //! `#for k in A..B` ... `#end`, `#if EXPRESSION` ... `#else` ... `#end`. In all other lines
 //! `${EXPRESSION}` becomes a number, and the word `WORKGROUP_SIZE` becomes the kernel's `256u`
 //! style literal. Expressions are integer arithmetic (`+ - * / %`, comparisons, `&& || !`,
-//! parentheses) on literals, loop variables and [`CONSTANTS`](crate::layout::CONSTANTS).
+//! parentheses) on literals, loop variables and [`CONSTANTS`].
 mod expression;
 
 use crate::{kernels::Kernel, layout::CONSTANTS};
