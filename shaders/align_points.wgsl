@@ -49,21 +49,10 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
                 let rgb = color_output(h);
                 let rc = dot(LUMA, rgb) - q.w;
                 let dc = vec4f(LUMA * rgb * (1.0 - rgb), 0.0);
-#for k in 0..8
-                {
-                    let t = vec4f(dot(sw[${264+k*4}], dc), dot(sw[${265+k*4}], dc), dot(sw[${266+k*4}], dc), dot(sw[${267+k*4}], dc));
-                    h[${k}] = select(vec4f(0.0), t, h[${k}] > vec4f(0.0));
+                h = color_hidden_delta(h, dc);
+                for (var k = 0u; k < 8u; k++) {
+                    f[k] = input_gradient(0u, k, h);
                 }
-#end
-#for k in 0..8
-                {
-                    var t = vec4f(0.0);
-#for c in 0..4
-                    t[${c}] = dot8(${(k*4+c)*8}u, h);
-#end
-                    f[${k}] = t;
-                }
-#end
                 let gc = lookup_appearance_gradient(p, f);
                 let es = rs / params.robust_distance;
                 let ec = rc / params.robust_intensity;

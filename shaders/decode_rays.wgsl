@@ -38,26 +38,18 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     let loss_color = dot(difference, difference) / 3.0;
     let drgb = difference * (2.0 / 3.0 * params.weight_color * inv_rays);
     let dc = vec4f(drgb * rgb * (1.0 - rgb), 0.0);
+    let delta = color_hidden_delta(hc, dc);
 #for q in 0..8
-    {
-        let t = vec4f(dot(sw[${264+q*4}], dc), dot(sw[${265+q*4}], dc), dot(sw[${266+q*4}], dc), dot(sw[${267+q*4}], dc));
-        let d = select(vec4f(0.0), t, hc[${q}] > vec4f(0.0));
-        ray_state[state + ${STATE_COLOR_HIDDEN+q}u] = hc[${q}];
-        ray_state[state + ${STATE_COLOR_HIDDEN_DELTA+q}u] = d;
-        hc[${q}] = d;
-    }
+    ray_state[state + ${STATE_COLOR_HIDDEN+q}u] = hc[${q}];
+#end
+    hc = delta;
+#for q in 0..8
+    ray_state[state + ${STATE_COLOR_HIDDEN_DELTA+q}u] = hc[${q}];
 #end
     ray_state[state + ${STATE_COLOR_DELTA}u] = dc;
-    // dL/d(appearance features) = W1 d; inputs outer, so each is one row of dots.
-#for q in 0..8
-    {
-        var t = vec4f(0.0);
-#for c in 0..4
-        t[${c}] = dot8(${(q*4+c)*8}u, hc);
-#end
-        ray_state[state + ${STATE_APPEARANCE_GRADIENT+q}u] = t;
+    for (var q = 0u; q < 8u; q++) {
+        ray_state[state + ${STATE_APPEARANCE_GRADIENT}u + q] = input_gradient(0u, q, hc);
     }
-#end
 
     // Depth: squared error on rays with a sensor depth. Its gradient is stored unweighted by the interval.
     var loss_depth = 0.0;
@@ -110,24 +102,16 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
         ray_state[state + ${STATE_FEATURE+j}u] = feature[${j}];
         ray_state[state + ${STATE_FEATURE_DELTA+j}u] = df[${j}];
 #end
-#for q in 0..8
-        {
-            let t = vec4f(dot4(${561+q*16}u, df), dot4(${565+q*16}u, df), dot4(${569+q*16}u, df), dot4(${573+q*16}u, df));
-            let d = select(vec4f(0.0), t, hs[${q}] > vec4f(0.0));
-            ray_state[state + ${STATE_SEMANTIC_HIDDEN+q}u] = hs[${q}];
-            ray_state[state + ${STATE_SEMANTIC_HIDDEN_DELTA+q}u] = d;
-            hs[${q}] = d;
+        for (var q = 0u; q < 8u; q++) {
+            let w = 561u + q * 16u;
+            let t = vec4f(dot4(w, df), dot4(w + 4u, df), dot4(w + 8u, df), dot4(w + 12u, df));
+            ray_state[state + ${STATE_SEMANTIC_HIDDEN}u + q] = hs[q];
+            hs[q] = select(vec4f(0.0), t, hs[q] > vec4f(0.0));
+            ray_state[state + ${STATE_SEMANTIC_HIDDEN_DELTA}u + q] = hs[q];
         }
-#end
-#for q in 0..8
-        {
-            var t = vec4f(0.0);
-#for c in 0..4
-            t[${c}] = dot8(${297+(q*4+c)*8}u, hs);
-#end
-            ray_state[state + ${STATE_SEMANTIC_GRADIENT+q}u] = t;
+        for (var q = 0u; q < 8u; q++) {
+            ray_state[state + ${STATE_SEMANTIC_GRADIENT}u + q] = input_gradient(297u, q, hs);
         }
-#end
     }
     let out = ray * 3u;
     let depth_error = select(0.0, abs(geometry.x - r.depth), r.depth > 0.0);
