@@ -167,7 +167,7 @@ pub struct ConfigArgs {
 /// What is written where.
 #[derive(Clone, Debug, Args)]
 pub struct OutputArgs {
-    /// Output folder [default: out/<dataset>-<preset>].
+    /// Output folder [default: out/DATASET-PRESET].
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath, help_heading = "Output")]
     pub out: Option<PathBuf>,
     /// Write into a folder that holds other files (they stay).
