@@ -19,20 +19,33 @@ fn texture(p: DVec3) -> f32 {
 
 /// Nearest hit of a ray with planes n . p = d.
 fn render(planes: &[(DVec3, f64)], pose: &Pose, textured: bool) -> RgbdPyramid {
+    render_unregistered(planes, pose, textured, 1.0)
+}
+
+/// The same, with a colour camera whose focal length is `scale` times the depth camera's.
+fn render_unregistered(
+    planes: &[(DVec3, f64)],
+    pose: &Pose,
+    textured: bool,
+    scale: f64,
+) -> RgbdPyramid {
     let c = camera();
+    let cast = |ray: DVec3| {
+        let (o, r) = (pose.translation, pose.transform_vector(ray));
+        let z = planes
+            .iter()
+            .map(|(n, d)| (d - n.dot(o)) / n.dot(r))
+            .filter(|z| *z > 0.1)
+            .fold(f64::INFINITY, f64::min);
+        (z < 7.0).then(|| (z as f32, texture(o + r * z)))
+    };
     let (mut intensity, mut depth) = (Vec::new(), Vec::new());
     for v in 0..c.height {
         for u in 0..c.width {
             let ray = c.back_project(f64::from(u), f64::from(v), 1.0);
-            let (o, r) = (pose.translation, pose.transform_vector(ray));
-            let z = planes
-                .iter()
-                .map(|(n, d)| (d - n.dot(o)) / n.dot(r))
-                .filter(|z| *z > 0.1)
-                .fold(f64::INFINITY, f64::min);
-            let found = z.is_finite() && z < 7.0;
-            depth.push(if found { z as f32 } else { 0.0 });
-            intensity.push(if textured && found { texture(o + r * z) } else { 0.5 });
+            depth.push(cast(ray).map_or(0.0, |hit| hit.0));
+            let colour = cast(DVec3::new(ray.x / scale, ray.y / scale, 1.0));
+            intensity.push(colour.filter(|_| textured).map_or(0.5, |hit| hit.1));
         }
     }
     RgbdPyramid::from_images(0, intensity, depth, &c, &PyramidConfig::default())
@@ -240,5 +253,27 @@ fn a_loop_closure_straightens_a_bent_chain() {
     assert!(after < 1e-9 * before, "{before} {after}");
     for (a, b) in graph.poses.iter().zip(&truth) {
         assert!(difference(a, b) < 1e-6);
+    }
+}
+
+#[test]
+fn a_colour_camera_of_another_focal_length_is_found_and_an_equal_one_left_alone() {
+    let poses = [
+        Pose::IDENTITY,
+        Pose::from_twist(&[0.12, -0.05, 0.1, 0.05, -0.12, 0.06]),
+        Pose::from_twist(&[-0.1, 0.08, -0.05, -0.08, 0.1, -0.05]),
+    ];
+    for scale in [0.9, 1.0] {
+        let views: Vec<_> =
+            poses.iter().map(|p| render_unregistered(&room(), p, true, scale)).collect();
+        let pairs: Vec<_> = [(0, 1), (1, 2), (0, 2)]
+            .map(|(i, j)| registration::Pair {
+                reference: &views[i],
+                current: &views[j],
+                reference_from_current: poses[i].inverse().compose(&poses[j]),
+            })
+            .into();
+        let found = registration::estimate(&pairs).scale;
+        assert!((found - scale).abs() < 0.01, "found {found}, expected {scale}");
     }
 }
