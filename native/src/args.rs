@@ -111,7 +111,8 @@ pub enum Command {
 /// Which engine computes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum EngineChoice {
-    /// A graphics adapter if there is one, else the processor.
+    /// A hardware graphics adapter if there is one, else the processor (which beats software
+    /// adapters such as llvmpipe).
     #[default]
     Auto,
     /// A graphics adapter (Vulkan, Metal or DirectX 12); an error without one.

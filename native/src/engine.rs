@@ -17,7 +17,14 @@ pub struct Chosen {
     pub note: String,
 }
 
-/// Start the engine that the flags ask for. `auto` takes a graphics adapter if there is one and
+/// Whether `auto` takes an adapter of this type. Software adapters run the shaders on the same
+/// processor as the twins, at half their speed (`mte-slam bench` on llvmpipe) and only after
+/// compiling them for the better part of a minute.
+pub fn is_hardware(device_type: &str) -> bool {
+    device_type != "Cpu"
+}
+
+/// Start the engine that the flags ask for. `auto` takes a hardware adapter if there is one and
 /// else the processor, and the note says which and why. An adapter that was named is never
 /// replaced by another.
 pub fn start(args: &EngineArgs) -> Result<Chosen> {
@@ -30,11 +37,13 @@ pub fn start(args: &EngineArgs) -> Result<Chosen> {
         }
         return Ok(describe(Engine::cpu(), String::new()));
     }
+    let automatic = args.engine == EngineChoice::Auto && args.adapter.is_none();
+    if automatic && let Some(reason) = only_software() {
+        return Ok(describe(Engine::cpu(), format!(", because: {reason}")));
+    }
     match start_gpu(args.adapter.as_deref()) {
         Ok(engine) => Ok(describe(engine, String::new())),
-        Err(reason) if args.engine == EngineChoice::Auto && args.adapter.is_none() => {
-            Ok(describe(Engine::cpu(), format!(", because: {reason}")))
-        }
+        Err(reason) if automatic => Ok(describe(Engine::cpu(), format!(", because: {reason}"))),
         Err(reason) => {
             let flag = match &args.adapter {
                 Some(name) => format!("--adapter {name}"),
@@ -46,6 +55,22 @@ pub fn start(args: &EngineArgs) -> Result<Chosen> {
             )
         }
     }
+}
+
+/// Why `auto` passes over the adapters, when all that can be used are software.
+#[cfg(feature = "gpu")]
+fn only_software() -> Option<String> {
+    let adapters = pollster::block_on(mte_slam_core::engine::list_adapters());
+    let usable: Vec<_> = adapters.iter().filter(|a| a.missing.is_empty()).collect();
+    if usable.is_empty() || usable.iter().any(|a| is_hardware(&a.device_type)) {
+        return None;
+    }
+    Some(format!("{} is a software adapter; --engine gpu takes it", usable[0].name))
+}
+
+#[cfg(not(feature = "gpu"))]
+fn only_software() -> Option<String> {
+    None
 }
 
 #[cfg(feature = "gpu")]

@@ -1,5 +1,5 @@
 //! `mte-slam info`.
-use crate::{args::InfoArgs, screen::Screen};
+use crate::{args::InfoArgs, engine::is_hardware, screen::Screen};
 use anyhow::Result;
 use mte_slam_core::engine::MAX_BUFFER_BYTES;
 use serde::Serialize;
@@ -20,7 +20,8 @@ struct Adapter {
 pub fn run(_args: &InfoArgs, screen: Screen) -> Result<()> {
     let adapters = adapters();
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let auto = match adapters.iter().find(|a| a.missing.is_empty()) {
+    let taken = |a: &&Adapter| a.missing.is_empty() && is_hardware(&a.device_type);
+    let auto = match adapters.iter().find(taken) {
         Some(_) => "gpu",
         None => "cpu",
     };
