@@ -145,7 +145,6 @@ pub struct Device {
     /// Storage slots of frames; slot 0 is the current frame.
     pub slots: u32,
     camera: Camera,
-    depth_unit_m: f64,
     base: FieldParams,
     status: BufferId,
     poses: BufferId,
@@ -229,7 +228,6 @@ impl Device {
             step: 0,
             slots,
             camera,
-            depth_unit_m,
             base,
             status: e.create_buffer("status", 4)?,
             poses: e.create_buffer("poses", slots as usize * 12)?,
@@ -274,7 +272,7 @@ impl Device {
         self.max_rays
     }
 
-    /// Puts a frame's images into a slot.
+    /// Puts a frame's images into a slot, and forgets the pose optimiser's state of the slot's former frame.
     pub fn upload_frame(&self, r: &mut Recording, slot: u32, frame: &Frame) {
         let pixels = self.camera.pixels();
         let mut color = Vec::with_capacity(pixels);
@@ -289,17 +287,7 @@ impl Device {
             .collect();
         r.upload(self.color_images, slot as usize * pixels, &color);
         r.upload(self.depth_images, slot as usize * pixels.div_ceil(2), &depth);
-    }
-
-    /// Copies images and pose of one slot to another.
-    pub fn copy_slot(&self, r: &mut Recording, from: u32, to: u32) {
-        let pixels = self.camera.pixels();
-        for (buffer, words) in
-            [(self.color_images, pixels), (self.depth_images, pixels.div_ceil(2)), (self.poses, 12)]
-        {
-            r.copy(buffer, from as usize * words, buffer, to as usize * words, words);
-        }
-        r.clear(self.pose_state, to as usize * POSE_STATE_FLOATS, POSE_STATE_FLOATS);
+        r.clear(self.pose_state, slot as usize * POSE_STATE_FLOATS, POSE_STATE_FLOATS);
     }
 
     /// Sets the pose of a slot.
@@ -452,16 +440,6 @@ impl Device {
         self.shape = shape;
         shape.fill(&mut self.base);
         Ok(())
-    }
-
-    /// The camera of the stored frames.
-    pub fn camera(&self) -> &Camera {
-        &self.camera
-    }
-
-    /// Metres per unit of the stored depth images.
-    pub fn depth_unit_m(&self) -> f64 {
-        self.depth_unit_m
     }
 
     /// Renders through another camera from now on (dense batches only use its size and intrinsics;

@@ -154,7 +154,7 @@ impl Slam {
         if camera.width == 0 || camera.height == 0 || camera.pixels() > 1 << 28 {
             return Err(wrong("camera", format!("{camera:?}"), "an image size"));
         }
-        let mut info = SequenceInfo {
+        let info = SequenceInfo {
             name: state.name,
             layout: "checkpoint",
             camera,
@@ -224,7 +224,6 @@ impl Slam {
                 },
             });
         }
-        info.frames = n;
         slam.engine = None;
         slam.device = Some(device);
         Ok(slam)

@@ -95,7 +95,6 @@ impl Slam {
             .collect();
         let rates = Rates { planes: m.rate_planes * factor, decoders: m.rate_decoders * factor };
         let losses = self.optimise(iterations, rates, &near).await?;
-        self.last_mapped = Some(frame.index);
         if !keyframe && let Some(k) = self.keyframes.pop() {
             self.free_slots.push(k.slot);
         }

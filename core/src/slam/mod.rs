@@ -149,7 +149,6 @@ pub struct Slam {
     free_slots: Vec<u32>,
     /// Batches so far: the counter of the random numbers.
     iteration: u32,
-    last_mapped: Option<usize>,
     bounds_refused: bool,
     clock: Option<fn() -> f64>,
 }
@@ -179,7 +178,6 @@ impl Slam {
             observations: Vec::new(),
             free_slots: Vec::new(),
             iteration: 0,
-            last_mapped: None,
             bounds_refused: false,
             clock: None,
         })
