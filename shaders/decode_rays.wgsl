@@ -11,6 +11,10 @@
 @group(0) @binding(4) var<storage, read_write> ray_out: array<vec4f>;
 // C floats a ray: gradient at the class logits.
 @group(0) @binding(5) var<storage, read_write> logits_gradient: array<f32>;
+// Per anchor: vector (4) | class (bits, 255: free), matches, importance, variation | age.
+@group(0) @binding(6) var<storage, read> anchors: array<vec4f>;
+// Per slot and token: fused feature (4) | weight.
+@group(0) @binding(7) var<storage, read> targets: array<vec4f>;
 
 #import shared/surface.wgsl
 
@@ -68,6 +72,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
 #for q in 0..8
         f[${q}] = ray_state[state + ${STATE_SEMANTIC+q}u];
 #end
+        let label = ray_class(r);
         var hs = semantic_hidden(f);
         var feature = semantic_output(hs);
         var best = -1e30;
@@ -82,9 +87,9 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
             } else {
                 sum += exp(logit - best);
             }
-            own = select(own, logit, c == r.label);
+            own = select(own, logit, c == label);
         }
-        let labelled = r.label < params.classes;
+        let labelled = label < params.classes;
         var df: array<vec4f, 4>;
         if (labelled) {
             loss_semantic = log(sum) + best - own;
@@ -92,12 +97,63 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
         let scale = select(0.0, params.weight_semantic * inv_rays, labelled);
         for (var c = 0u; c < params.classes; c++) {
             let p = exp(class_logit(feature, c) - best) / sum;
-            let g = scale * (p - select(0.0, 1.0, c == r.label));
+            let g = scale * (p - select(0.0, 1.0, c == label));
             logits_gradient[ray * params.classes + c] = g;
 #for j in 0..4
             df[${j}] += g * decoders[${HEAD_VEC4+j}u + c * 4u];
 #end
         }
+        // Nearest anchor (paper eq. 9) and compression loss (10).
+        var nearest = ${NO_ANCHOR}u;
+        var nearest_class = 255u;
+        var distance = 1e30;
+        var own_distance = 1e30;
+        for (var a = 0u; a < params.anchors; a++) {
+            let at = a * ${ANCHOR_VEC4}u;
+            let class_id = bitcast<u32>(anchors[at + 4u].x);
+            if (class_id == 255u) {
+                continue;
+            }
+            var d = 0.0;
+#for j in 0..4
+            let e${j} = feature[${j}] - anchors[at + ${j}u];
+            d += dot(e${j}, e${j});
+#end
+            if (d < distance) {
+                nearest = a;
+                nearest_class = class_id;
+                distance = d;
+            }
+            if (class_id == label) {
+                own_distance = min(own_distance, d);
+            }
+        }
+        if ((params.flags & FLAG_ANCHORS) != 0u && nearest != ${NO_ANCHOR}u) {
+            best_class = nearest_class;
+        }
+        var loss_feature = 0.0;
+        if (!masked && params.weight_compression > 0.0 && nearest != ${NO_ANCHOR}u) {
+            let at = nearest * ${ANCHOR_VEC4}u;
+#for j in 0..4
+            df[${j}] += 2.0 * params.weight_compression * inv_rays * (feature[${j}] - anchors[at + ${j}u]);
+#end
+            loss_feature += params.weight_compression * distance;
+        }
+        // The fused feature of the pixel's token is the target of the feature loss.
+        if (!masked && params.weight_feature > 0.0 && params.token_columns > 0u) {
+            let pixel = r.label >> 8u;
+            let slot = (r.frame & 0x7fffffffu) >> 8u;
+            let column = min(pixel % params.width / params.token_size, params.token_columns - 1u);
+            let row = min(pixel / params.width / params.token_size, params.token_rows - 1u);
+            let at = ((slot * params.token_rows + row) * params.token_columns + column) * ${TARGET_VEC4}u;
+            let weight = params.weight_feature * targets[at + 4u].x;
+#for j in 0..4
+            let t${j} = feature[${j}] - targets[at + ${j}u];
+            df[${j}] += 2.0 * weight * inv_rays * t${j};
+            loss_feature += weight * dot(t${j}, t${j});
+#end
+        }
+        ray_state[state + ${STATE_ANCHOR}u] = vec4f(bitcast<f32>(nearest), distance, own_distance, loss_feature);
 #for j in 0..4
         ray_state[state + ${STATE_FEATURE+j}u] = feature[${j}];
         ray_state[state + ${STATE_FEATURE_DELTA+j}u] = df[${j}];

@@ -51,21 +51,21 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     );
     out.origin = vec3f(poses[b + 9u], poses[b + 10u], poses[b + 11u]);
     out.depth = f32(raw) * params.depth_unit;
-    out.frame = frame;
+    out.frame = frame | (slot << 8u);
     // A rendered view may have another size than the stored images: it has no colours to compare with.
     var c = 0xff000000u;
     if ((params.flags & (FLAG_DENSE | FLAG_GUIDED)) != FLAG_DENSE) {
         c = color_images[slot * pixels + pixel];
     }
     out.color = vec3f(f32(c & 255u), f32((c >> 8u) & 255u), f32((c >> 16u) & 255u)) / 255.0;
-    out.label = c >> 24u;
+    out.label = (c >> 24u) | (pixel << 8u);
     // A surface outside the map teaches nothing: mark the ray (top bit of frame) so that no loss uses it.
     let hit = out.origin + out.direction * out.depth;
     let outside = any(hit < params.box_min.xyz) || any(hit > params.box_max.xyz);
     if (outside && (params.flags & FLAG_DENSE) == 0u) {
         out.frame = out.frame | 0x80000000u;
         out.depth = 0.0;
-        out.label = 255u;
+        out.label = out.label | 255u;
     }
     rays[ray] = out;
 }

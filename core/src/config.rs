@@ -45,6 +45,10 @@ pub struct Config {
     pub mapping: MappingConfig,
     /// Keyframes.
     pub keyframes: KeyframeConfig,
+    /// Multi-tier feature fusion.
+    pub fusion: FusionConfig,
+    /// Feature redundancy suppressor.
+    pub suppressor: SuppressorConfig,
     /// Meshing.
     pub mesh: MeshConfig,
 }
@@ -180,6 +184,98 @@ pub struct KeyframeConfig {
     pub budget_mib: u32,
 }
 
+/// Multi-tier feature fusion (paper III-A). Without labels it is off.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FusionConfig {
+    /// Use it.
+    pub enabled: bool,
+    /// Edge of a token \[pixels\]: 8, 16, 24 or 32.
+    pub token_pixels: u32,
+    /// Every n-th column and row of tokens is a key of the attention.
+    pub key_stride: u32,
+    /// Add a token's own appearance to what attention gives in the second stage.
+    pub residual: bool,
+    /// Local module: depthwise convolution before the pointwise one.
+    pub local: bool,
+    /// Edge of the pointwise convolution: 1, or 3 as the paper writes.
+    pub local_kernel: u32,
+    /// Edge of the gate's convolution: 1 or 3.
+    pub gate_kernel: u32,
+    /// Training steps a mapping call, half of them on earlier frames.
+    pub steps: u32,
+    /// Training steps on the first frame.
+    pub first_steps: u32,
+    /// Adam step.
+    pub rate: f64,
+    /// Weight of the cross-entropy at the fused features.
+    pub weight_class: f64,
+    /// Weight of the colour loss at the fused features.
+    pub weight_color: f64,
+    /// Exponent of the inverse frequency that weighs classes: 0 as they come, 1 balanced.
+    pub balance: f64,
+    /// Weight of the feature loss: rays against the fused feature of their pixel.
+    pub weight: f64,
+}
+
+/// How anchors follow their features.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum AnchorRule {
+    /// Moving average with a fixed rate (paper eq. 11).
+    Average,
+    /// Running mean (paper eq. 12).
+    Mean,
+}
+
+/// What gives a rendered pixel its class.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Inference {
+    /// The class head.
+    Head,
+    /// The nearest anchor.
+    Anchors,
+}
+
+/// Feature redundancy suppressor (paper III-B). Without labels it is off.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SuppressorConfig {
+    /// Use it.
+    pub enabled: bool,
+    /// Most anchors, 1 to 256.
+    pub anchors: u32,
+    /// Weight of the compression loss once it is on in full.
+    pub weight: f64,
+    /// Mapping calls before the compression loss begins.
+    pub start: u32,
+    /// Mapping calls over which it rises.
+    pub ramp: u32,
+    /// How anchors follow their features.
+    pub rule: AnchorRule,
+    /// Rate of the moving average.
+    pub beta: f64,
+    /// Matches that the running mean remembers at most.
+    pub memory: f64,
+    /// What importance and votes keep at each update.
+    pub decay: f64,
+    /// A feature this far from every anchor of its class spawns one.
+    pub spawn_distance: f64,
+    /// Anchors of a class closer than this merge.
+    pub merge_distance: f64,
+    /// Anchors spawned at most a maintenance.
+    pub spawns: u32,
+    /// Anchors merge once they move less than this an update.
+    pub stable: f64,
+    /// Less important anchors (matches, decayed) are dropped.
+    pub min_importance: f64,
+    /// Updates before an anchor may be dropped or merged.
+    pub min_age: u32,
+    /// What gives a rendered pixel its class.
+    pub inference: Inference,
+}
+
 /// Meshing.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -200,6 +296,8 @@ impl Default for Config {
             tracking: TrackingConfig::default(),
             mapping: MappingConfig::default(),
             keyframes: KeyframeConfig::default(),
+            fusion: FusionConfig::default(),
+            suppressor: SuppressorConfig::default(),
             mesh: MeshConfig::default(),
         }
     }
@@ -295,6 +393,50 @@ impl Default for MappingConfig {
 impl Default for KeyframeConfig {
     fn default() -> Self {
         KeyframeConfig { every: 5, budget_mib: 96 }
+    }
+}
+
+impl Default for FusionConfig {
+    fn default() -> Self {
+        FusionConfig {
+            enabled: true,
+            token_pixels: 8,
+            key_stride: 2,
+            residual: true,
+            local: true,
+            local_kernel: 1,
+            gate_kernel: 1,
+            steps: 4,
+            first_steps: 40,
+            rate: 1e-2,
+            weight_class: 1.0,
+            weight_color: 0.5,
+            balance: 0.5,
+            weight: 0.02,
+        }
+    }
+}
+
+impl Default for SuppressorConfig {
+    fn default() -> Self {
+        SuppressorConfig {
+            enabled: true,
+            anchors: 128,
+            weight: 0.01,
+            start: 1,
+            ramp: 10,
+            rule: AnchorRule::Mean,
+            beta: 0.05,
+            memory: 2000.0,
+            decay: 0.999,
+            spawn_distance: 4.0,
+            merge_distance: 1.0,
+            spawns: 8,
+            stable: 0.05,
+            min_importance: 2.0,
+            min_age: 40,
+            inference: Inference::Head,
+        }
     }
 }
 
@@ -434,6 +576,37 @@ impl Config {
         count("mapping.decoder_stride", m.decoder_stride, 1024, "1 to 1024")?;
         count("keyframes.every", self.keyframes.every, u32::MAX, "at least 1")?;
         count("keyframes.budget_mib", self.keyframes.budget_mib, 1 << 16, "1 to 65536")?;
+        let f = &self.fusion;
+        check(
+            [8, 16, 24, 32].contains(&f.token_pixels),
+            "fusion.token_pixels",
+            format!("{}", f.token_pixels),
+            "8, 16, 24 or 32",
+        )?;
+        count("fusion.key_stride", f.key_stride, 16, "1 to 16")?;
+        for (field, edge) in
+            [("fusion.local_kernel", f.local_kernel), ("fusion.gate_kernel", f.gate_kernel)]
+        {
+            check(edge == 1 || edge == 3, field, format!("{edge}"), "1 or 3")?;
+        }
+        count("fusion.steps", f.steps.max(1), 1000, "0 to 1000")?;
+        count("fusion.first_steps", f.first_steps.max(1), 10_000, "0 to 10000")?;
+        positive("fusion.rate", f.rate)?;
+        not_negative("fusion.weight_class", f.weight_class)?;
+        not_negative("fusion.weight_color", f.weight_color)?;
+        not_negative("fusion.balance", f.balance)?;
+        not_negative("fusion.weight", f.weight)?;
+        let a = &self.suppressor;
+        count("suppressor.anchors", a.anchors, 256, "1 to 256")?;
+        not_negative("suppressor.weight", a.weight)?;
+        for (field, x) in [("suppressor.beta", a.beta), ("suppressor.decay", a.decay)] {
+            check((0.0..=1.0).contains(&x), field, format!("{x}"), "0 to 1")?;
+        }
+        positive("suppressor.memory", a.memory)?;
+        positive("suppressor.spawn_distance", a.spawn_distance)?;
+        positive("suppressor.merge_distance", a.merge_distance)?;
+        not_negative("suppressor.stable", a.stable)?;
+        not_negative("suppressor.min_importance", a.min_importance)?;
         positive("mesh.resolution_m", self.mesh.resolution_m)?;
         Ok(())
     }

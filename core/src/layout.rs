@@ -45,8 +45,23 @@ pub const STATE_SEMANTIC_GRADIENT: u32 = 65;
 pub const STATE_DEPTH: u32 = 73;
 /// Pose gradient: translation, rotation (2).
 pub const STATE_POSE: u32 = 74;
+/// Nearest anchor (bits, [`NO_ANCHOR`] without one), its squared distance, the squared distance to
+/// the nearest anchor of the ray's own class, weighted loss against anchor and fused feature (1).
+pub const STATE_ANCHOR: u32 = 76;
 /// Size in vec4.
-pub const STATE_END: u32 = 76;
+pub const STATE_END: u32 = 77;
+
+/// Channels of a semantic feature, an anchor, and the attention.
+pub const FEATURE: usize = 16;
+/// Floats of an anchor: vector (16) | class (bits, 255 for a free slot), matches, importance,
+/// temporal variation | age \[updates\], 0, 0, 0.
+pub const ANCHOR_FLOATS: usize = 24;
+/// No anchor.
+pub const NO_ANCHOR: u32 = 0xffff;
+/// Floats of a token's fused feature as the rays' target: feature (16) | weight, 0, 0, 0.
+pub const TARGET_FLOATS: usize = 20;
+/// Squared distance to an anchor that does not exist.
+pub const NO_DISTANCE: f32 = 1e30;
 
 /// Constants every shader may name as `${NAME}`.
 pub const CONSTANTS: &[(&str, u32)] = &[
@@ -71,6 +86,19 @@ pub const CONSTANTS: &[(&str, u32)] = &[
     ("STATE_SEMANTIC_GRADIENT", STATE_SEMANTIC_GRADIENT),
     ("STATE_DEPTH", STATE_DEPTH),
     ("STATE_POSE", STATE_POSE),
+    ("STATE_ANCHOR", STATE_ANCHOR),
+    ("ANCHOR_VEC4", (ANCHOR_FLOATS / 4) as u32),
+    ("TARGET_VEC4", (TARGET_FLOATS / 4) as u32),
+    ("NO_ANCHOR", NO_ANCHOR),
+    ("BANDS", crate::kernels::tokens::BANDS),
+    ("RAW_PATCH", crate::kernels::tokens::RAW_PATCH),
+    ("RAW_MEAN", crate::kernels::tokens::RAW_MEAN),
+    ("RAW_HISTOGRAM", crate::kernels::tokens::RAW_HISTOGRAM),
+    ("GEOMETRY_AT", crate::kernels::tokens::GEOMETRY_AT),
+    ("GATE_AT", crate::kernels::tokens::GATE_AT),
+    ("FUSED_AT", crate::kernels::tokens::FUSED_AT),
+    ("COLOR_AT", crate::kernels::tokens::COLOR_AT),
+    ("LOGITS_AT", crate::kernels::tokens::LOGITS_AT),
 ];
 
 params! {
@@ -166,11 +194,19 @@ params! {
         robust_intensity: f32,
         /// Gradients at a sample's pre-activation below this (times the rays) are dropped.
         min_gradient: f32,
+        /// Weight of the compression loss.
+        weight_compression: f32,
+        /// Weight of the feature loss.
+        weight_feature: f32,
+        /// Slots of anchors that may be in use; 0 without suppressor.
+        anchors: u32,
+        /// Token columns of an image; 0 without fusion.
+        token_columns: u32,
+        /// Token rows of an image.
+        token_rows: u32,
+        /// Edge of a token \[pixels\].
+        token_size: u32,
         /// Unused.
-        spare0: f32,
-        /// Unused.
-        spare1: f32,
-        /// Unused.
-        spare2: f32,
+        spare: u32,
     }
 }

@@ -25,7 +25,9 @@ struct Params {
     // align_points: 1 / sigma of both residuals [1/m, 1], scales of the robust weights [m, 1].
     inv_sigma_distance: f32, inv_sigma_intensity: f32, robust_distance: f32, robust_intensity: f32,
     // Gradients at a sample's pre-activation below this (per ray) are dropped: they move nothing but cost a scatter.
-    min_gradient: f32, spare0: f32, spare1: f32, spare2: f32,
+    min_gradient: f32, weight_compression: f32, weight_feature: f32, anchors: u32,
+    // Token grid of the fused features [tokens], edge of a token [pixels].
+    token_columns: u32, token_rows: u32, token_size: u32, spare: u32,
 }
 @group(0) @binding(0) var<uniform> params: Params;
 
@@ -39,3 +41,5 @@ const FLAG_POSE: u32 = 4u;
 const FLAG_MAP: u32 = 8u;
 // Mask rays whose depth error passes the outlier threshold.
 const FLAG_MASK: u32 = 16u;
+// Class of a ray: that of its nearest anchor, not the head's.
+const FLAG_ANCHORS: u32 = 32u;

@@ -53,6 +53,8 @@ fn map(engine: Engine) -> Vec<Vec<u32>> {
             loss: &loss,
             iteration,
             first: 0,
+            compression: 0.0,
+            feature: 0.0,
         };
         let mut r = Recording::new();
         d.record_forward(&mut r, &batch);

@@ -106,6 +106,8 @@ impl Problem {
             loss,
             iteration: 5,
             first: 0,
+            compression: 0.0,
+            feature: 0.0,
         }
     }
 

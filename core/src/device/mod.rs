@@ -1,5 +1,10 @@
 //! The map's buffers on an engine, and the recordings of one pass over a batch of rays.
+mod fusion;
 mod passes;
+mod suppressor;
+
+pub use fusion::{Fusion, Layer};
+pub use suppressor::{AnchorCounts, Suppressor};
 
 use crate::{
     camera::Camera,
@@ -84,6 +89,10 @@ pub struct Batch<'a> {
     pub iteration: u32,
     /// First pixel of a dense batch.
     pub first: u32,
+    /// Weight of the compression loss.
+    pub compression: f64,
+    /// Weight of the feature loss.
+    pub feature: f64,
 }
 
 impl Batch<'_> {
@@ -138,6 +147,10 @@ pub struct Device {
     pub semantic: Trained,
     /// All decoders.
     pub decoders: Trained,
+    /// Multi-tier feature fusion, where there are classes.
+    pub fusion: Option<Fusion>,
+    /// Feature redundancy suppressor, where there are classes.
+    pub suppressor: Option<Suppressor>,
     /// Number of classes.
     pub classes: u32,
     /// Steps Adam has taken.
@@ -164,6 +177,10 @@ pub struct Device {
     logits_gradient: BufferId,
     geometry_partials: BufferId,
     decoder_partials: BufferId,
+    /// Stands for the anchors where there is no suppressor.
+    no_anchors: BufferId,
+    /// Fused features of all slots' tokens.
+    targets: BufferId,
     points: BufferId,
     values: BufferId,
     max_rays: u32,
@@ -182,8 +199,10 @@ impl Device {
     ) -> Result<Device, EngineError> {
         let e = &mut engine;
         let pixels = camera.pixels();
-        let slot_bytes = pixels * 4 + pixels.div_ceil(2) * 4;
-        let by_limit = e.max_buffer_words() / pixels;
+        let fused = classes > 0 && config.fusion.enabled;
+        let targets = if fused { fusion::target_floats(&camera, &config.fusion) } else { 0 };
+        let slot_bytes = pixels * 4 + pixels.div_ceil(2) * 4 + targets * 4;
+        let by_limit = e.max_buffer_words() / pixels.max(targets);
         let slots = (config.keyframes.budget_mib as usize * (1 << 20) / slot_bytes)
             .min(by_limit)
             .clamp(4, 1024) as u32;
@@ -218,12 +237,31 @@ impl Device {
         base.robust_distance = (2.0 * t.align_sigma_distance_m) as f32;
         base.robust_intensity = (2.0 * t.align_sigma_intensity) as f32;
         shape.fill(&mut base);
+        let fusion = if fused {
+            let origin = [shape.bounds.min.x, shape.bounds.min.y, shape.bounds.min.z, 0.0];
+            let f = config.fusion.clone();
+            Some(Fusion::new(e, &f, origin.map(|x| x as f32), &camera, classes, config.seed)?)
+        } else {
+            None
+        };
+        if let Some(f) = &fusion {
+            base.token_columns = f.columns;
+            base.token_rows = f.rows;
+            base.token_size = config.fusion.token_pixels;
+        }
+        let suppressor = if classes > 0 && config.suppressor.enabled {
+            Some(Suppressor::new(e, &config.suppressor, classes)?)
+        } else {
+            None
+        };
         let device = Device {
             shape,
             geometry: Trained::new(e, "geometry planes", shape.geometry_floats())?,
             appearance: Trained::new(e, "appearance planes", shape.surface_floats())?,
             semantic: Trained::new(e, "semantic planes", semantic_floats)?,
             decoders: Trained::new(e, "decoders", decoder_floats(classes))?,
+            fusion,
+            suppressor,
             classes,
             step: 0,
             slots,
@@ -251,6 +289,8 @@ impl Device {
                 "decoder partials",
                 rows * (decoder_floats(classes) - GEOMETRY_FLOATS),
             )?,
+            no_anchors: e.create_buffer("no anchors", 4)?,
+            targets: e.create_buffer("targets", (slots as usize * targets).max(4))?,
             points: e.create_buffer("points", QUERY_POINTS_MAX * 4)?,
             values: e.create_buffer("values", QUERY_POINTS_MAX * 8)?,
             max_rays: max_rays as u32,

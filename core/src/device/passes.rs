@@ -17,7 +17,7 @@ use crate::{
         sample_rays::SAMPLE_RAYS,
         scatter_geometry::SCATTER_GEOMETRY,
         scatter_surface::SCATTER_SURFACE,
-        shared::{FLAG_MAP, FLAG_MASK, FLAG_POSE},
+        shared::{FLAG_ANCHORS, FLAG_MAP, FLAG_MASK, FLAG_POSE},
         weight_gradient::{WEIGHT_GRADIENT, WeightGradientParams},
     },
     layout::{
@@ -46,6 +46,11 @@ impl Device {
         p.weight_depth = b.loss.depth as f32;
         p.weight_color = b.loss.color as f32;
         p.weight_semantic = b.loss.semantic as f32;
+        p.weight_compression = b.compression as f32;
+        p.weight_feature = b.feature as f32;
+        if b.flags & (FLAG_MAP | FLAG_ANCHORS) != 0 {
+            p.anchors = self.suppressor.as_ref().map_or(0, |s| s.slots());
+        }
         [p.scale_geometry, p.scale_appearance, p.scale_semantic] =
             QUANTA.map(|q| q * b.rays() as f32);
         p
@@ -86,7 +91,15 @@ impl Device {
         r.dispatch_1d(
             &DECODE_RAYS,
             &p,
-            &[self.rays, decoders, self.ray_state, self.ray_out, self.logits_gradient],
+            &[
+                self.rays,
+                decoders,
+                self.ray_state,
+                self.ray_out,
+                self.logits_gradient,
+                self.suppressor.as_ref().map_or(self.no_anchors, |s| s.anchors),
+                self.targets,
+            ],
             rays,
         );
         if b.flags & FLAG_MASK != 0 {

@@ -1,12 +1,14 @@
-//! Decoders and class head on composited features, their losses and gradients.
+//! Decoders and class head on composited features; the losses of colour, classes, feature and
+//! compression; their gradients.
 use super::shared::{
-    Ray, class_logit, color_backward, color_hidden, color_output, head_row, semantic_backward,
+    FLAG_ANCHORS, Ray, class_logit, color_backward, color_hidden, color_output, head_row, semantic_backward,
     semantic_hidden, semantic_output, surface_weights,
 };
 use super::{CpuDispatch, load_f32, store_f32, store_u32};
 use crate::{
     layout::{
-        FieldParams, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_APPEARANCE, STATE_APPEARANCE_GRADIENT,
+        ANCHOR_FLOATS, FieldParams, NO_ANCHOR, NO_DISTANCE, RAY_OUT_FLOATS, RAY_STATE_FLOATS,
+        STATE_ANCHOR, STATE_APPEARANCE, STATE_APPEARANCE_GRADIENT, TARGET_FLOATS,
         STATE_COLOR_DELTA, STATE_COLOR_HIDDEN, STATE_COLOR_HIDDEN_DELTA, STATE_DEPTH,
         STATE_FEATURE, STATE_FEATURE_DELTA, STATE_SEMANTIC, STATE_SEMANTIC_GRADIENT,
         STATE_SEMANTIC_HIDDEN, STATE_SEMANTIC_HIDDEN_DELTA,
@@ -28,6 +30,8 @@ kernel! {
             ray_state: ReadWrite,
             ray_out: ReadWrite,
             logits_gradient: ReadWrite,
+            anchors: Read,
+            targets: Read,
         ],
     }
 }
@@ -42,10 +46,52 @@ fn get<const N: usize>(state: &[AtomicU32], at: u32) -> [f32; N] {
     core::array::from_fn(|k| load_f32(&state[at as usize * 4 + k]))
 }
 
+struct Match {
+    index: u32,
+    class: u32,
+    distance: f32,
+    /// To the nearest anchor of the ray's own class.
+    own_distance: f32,
+}
+
+/// The nearest anchor of a feature (paper eq. 9), squared distances.
+fn nearest_anchor(p: &FieldParams, anchors: &[f32], feature: &[f32; 16], label: u32) -> Match {
+    let mut best =
+        Match { index: NO_ANCHOR, class: 255, distance: NO_DISTANCE, own_distance: NO_DISTANCE };
+    for (j, a) in anchors.chunks_exact(ANCHOR_FLOATS).take(p.anchors as usize).enumerate() {
+        let class = a[16].to_bits();
+        if class == 255 {
+            continue;
+        }
+        let distance = (0..16).map(|k| (feature[k] - a[k]) * (feature[k] - a[k])).sum::<f32>();
+        if distance < best.distance {
+            (best.index, best.class, best.distance) = (j as u32, class, distance);
+        }
+        if class == label {
+            best.own_distance = best.own_distance.min(distance);
+        }
+    }
+    best
+}
+
+/// The fused feature of the token that a ray's pixel lies in, and its weight.
+fn fused_target<'a>(p: &FieldParams, targets: &'a [f32], ray: &Ray) -> Option<&'a [f32]> {
+    if p.weight_feature == 0.0 || p.token_columns == 0 {
+        return None;
+    }
+    let pixel = ray.pixel();
+    let column = (pixel % p.width / p.token_size).min(p.token_columns - 1);
+    let row = (pixel / p.width / p.token_size).min(p.token_rows - 1);
+    let token = (ray.slot() * p.token_rows + row) * p.token_columns + column;
+    let at = token as usize * TARGET_FLOATS;
+    Some(&targets[at..at + TARGET_FLOATS])
+}
+
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
     let (rays, decoders) = (dispatch.read_f32(0), dispatch.read_f32(1));
     let (ray_state, ray_out, logits) = (dispatch.write(2), dispatch.write(3), dispatch.write(4));
+    let (anchors, targets) = (dispatch.read_f32(5), dispatch.read_f32(6));
     let surface = surface_weights(decoders);
     let inv_rays = 1.0 / p.rays as f32;
     dispatch.for_each_invocation(|id| {
@@ -83,6 +129,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
 
         let (mut loss_semantic, mut best_class) = (0.0, 255);
         if p.classes > 0 {
+            let label = ray.class();
             let hidden = semantic_hidden(surface, &get(state, STATE_SEMANTIC));
             let feature = semantic_output(surface, &hidden);
             let logit = |c| class_logit(decoders, &feature, p.classes, c);
@@ -96,18 +143,18 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                 } else {
                     sum += (l - best).exp();
                 }
-                if c == ray.label {
+                if c == label {
                     own = l;
                 }
             }
             let mut scale = 0.0;
-            if ray.label < p.classes {
+            if label < p.classes {
                 loss_semantic = sum.ln() + best - own;
                 scale = p.weight_semantic * inv_rays;
             }
             let mut dfeature = [0.0; 16];
             for c in 0..p.classes {
-                let target = if c == ray.label { 1.0 } else { 0.0 };
+                let target = if c == label { 1.0 } else { 0.0 };
                 let g = scale * ((logit(c) - best).exp() / sum - target);
                 store_f32(&logits[id * p.classes as usize + c as usize], g);
                 let row = head_row(decoders, c);
@@ -115,6 +162,31 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                     dfeature[k] += g * row[k];
                 }
             }
+            let matched = nearest_anchor(&p, anchors, &feature, label);
+            if p.flags & FLAG_ANCHORS != 0 && matched.index != NO_ANCHOR {
+                best_class = matched.class;
+            }
+            let mut loss_feature = 0.0;
+            if !ray.masked() {
+                if p.weight_compression > 0.0 && matched.index != NO_ANCHOR {
+                    let anchor = &anchors[matched.index as usize * ANCHOR_FLOATS..];
+                    for k in 0..16 {
+                        let e = feature[k] - anchor[k];
+                        dfeature[k] += 2.0 * p.weight_compression * inv_rays * e;
+                    }
+                    loss_feature += p.weight_compression * matched.distance;
+                }
+                if let Some(target) = fused_target(&p, targets, &ray) {
+                    let weight = p.weight_feature * target[16];
+                    for k in 0..16 {
+                        let e = feature[k] - target[k];
+                        dfeature[k] += 2.0 * weight * inv_rays * e;
+                        loss_feature += weight * e * e;
+                    }
+                }
+            }
+            let index = f32::from_bits(matched.index);
+            put(state, STATE_ANCHOR, &[index, matched.distance, matched.own_distance, loss_feature]);
             let (dh, df) = semantic_backward(surface, &hidden, &dfeature);
             put(state, STATE_FEATURE, &feature);
             put(state, STATE_FEATURE_DELTA, &dfeature);

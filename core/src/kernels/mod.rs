@@ -8,6 +8,7 @@ mod dispatch;
 #[macro_use]
 mod params;
 pub mod shared;
+pub mod tokens;
 
 pub use dispatch::{
     CpuBinding, CpuDispatch, add_i32, load_f32, load_i32, load_u32, or_u32, store_f32, store_i32,
@@ -108,18 +109,32 @@ registry! {
     adam: ADAM,
     /// Normal equations against the field.
     align_points: ALIGN_POINTS,
+    /// Attention's gradients at keys and values.
+    attend_keys: ATTEND_KEYS,
+    /// Attention's gradients at queries.
+    attend_queries: ATTEND_QUERIES,
+    /// Cross-attention.
+    attend_tokens: ATTEND_TOKENS,
     /// Interval weights.
     composite: COMPOSITE,
     /// Gradients at the signed distances.
     composite_backward: COMPOSITE_BACKWARD,
     /// Colour, classes and losses.
     decode_rays: DECODE_RAYS,
+    /// Raw features of image patches.
+    extract_tokens: EXTRACT_TOKENS,
+    /// Gradients through the gate.
+    gate_backward: GATE_BACKWARD,
+    /// Gating and fusion.
+    gate_tokens: GATE_TOKENS,
     /// Gradients at features and positions.
     geometry_backward: GEOMETRY_BACKWARD,
     /// Signed distances.
     geometry_forward: GEOMETRY_FORWARD,
     /// Geometry decoder's gradient.
     geometry_weights: GEOMETRY_WEIGHTS,
+    /// Anchors dropped, merged, spawned.
+    maintain_anchors: MAINTAIN_ANCHORS,
     /// Outliers of tracking.
     mask_rays: MASK_RAYS,
     /// Rays' pose gradients.
@@ -138,6 +153,16 @@ registry! {
     scatter_geometry: SCATTER_GEOMETRY,
     /// Gradients into the appearance and semantic planes.
     scatter_surface: SCATTER_SURFACE,
+    /// A layer on the token grid.
+    token_layer: TOKEN_LAYER,
+    /// Gradients at such a layer's inputs.
+    token_layer_backward: TOKEN_LAYER_BACKWARD,
+    /// Losses of the fused features.
+    token_loss: TOKEN_LOSS,
+    /// Gradients of such a layer's weights.
+    token_weights: TOKEN_WEIGHTS,
+    /// Anchors follow their features.
+    update_anchors: UPDATE_ANCHORS,
     /// Per-ray decoders' gradients.
     weight_gradient: WEIGHT_GRADIENT,
 }

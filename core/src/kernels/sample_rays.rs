@@ -64,16 +64,16 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             origin: [m[9], m[10], m[11]],
             depth: raw as f32 * p.depth_unit,
             direction: [row(0), row(3), row(6)],
-            frame,
+            frame: frame | slot << 8,
             color: [0, 8, 16].map(|shift| ((c >> shift) & 255) as f32 / 255.0),
-            label: c >> 24,
+            label: (c >> 24) | pixel << 8,
         };
         let hit = ray.at(ray.depth);
         let outside = (0..3).any(|k| hit[k] < p.box_min[k] || hit[k] > p.box_max[k]);
         if outside && p.flags & FLAG_DENSE == 0 {
             ray.frame |= RAY_MASKED;
             ray.depth = 0.0;
-            ray.label = 255;
+            ray.label |= 255;
         }
         for (k, word) in ray.words().into_iter().enumerate() {
             store_u32(&out[id * RAY_WORDS + k], word);

@@ -42,7 +42,10 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         let (quad, id, part) = (job % 4, (job / 4) % rays, job / (4 * rays));
         let (plane, level, modality) = (part % 3, (part / 3) % 2, part / 6);
         let ray = Ray::load(ray_words, id);
-        if ray.masked() || (modality == 1 && ray.label >= p.classes) {
+        let unlabelled = ray.class() >= p.classes
+            && p.weight_compression == 0.0
+            && p.weight_feature == 0.0;
+        if ray.masked() || (modality == 1 && unlabelled) {
             return;
         }
         let (scale, state) = if modality == 1 {

@@ -14,6 +14,8 @@ pub const FLAG_POSE: u32 = 4;
 pub const FLAG_MAP: u32 = 8;
 /// Mask rays whose depth error passes the outlier threshold.
 pub const FLAG_MASK: u32 = 16;
+/// Class of a ray: that of its nearest anchor, not the head's.
+pub const FLAG_ANCHORS: u32 = 32;
 /// Bit of `Ray::frame` that takes a ray out of every loss.
 pub const RAY_MASKED: u32 = 0x8000_0000;
 
@@ -34,11 +36,11 @@ pub struct Ray {
     pub depth: f32,
     /// World direction, 1 along the camera's axis.
     pub direction: Vec3,
-    /// Index in the window, with [`RAY_MASKED`].
+    /// Index in the window (8 bits), slot (23 bits), [`RAY_MASKED`].
     pub frame: u32,
     /// sRGB colour in 0..1.
     pub color: Vec3,
-    /// Compact class.
+    /// Compact class (8 bits), pixel (24 bits).
     pub label: u32,
 }
 
@@ -83,6 +85,21 @@ impl Ray {
             self.origin[1] + z * self.direction[1],
             self.origin[2] + z * self.direction[2],
         ]
+    }
+
+    /// Compact class, 255 where unlabelled.
+    pub fn class(&self) -> u32 {
+        self.label & 255
+    }
+
+    /// Pixel, counted row by row.
+    pub fn pixel(&self) -> u32 {
+        self.label >> 8
+    }
+
+    /// Storage slot of the frame.
+    pub fn slot(&self) -> u32 {
+        (self.frame & !RAY_MASKED) >> 8
     }
 
     /// Whether no loss may use the ray.

@@ -1,4 +1,5 @@
 //! Adding a frame to the map: bounds, keyframes, windows, optimisation, corrected poses.
+use super::semantics::steps_due;
 use super::{Losses, Observation, Slam, SlamError};
 use crate::{
     config::{RefinePoses, Tracker},
@@ -19,6 +20,8 @@ const OBSERVATION_WIDTH: u32 = 160;
 const ITERATIONS_PER_RECORDING: u32 = 4;
 /// Joint pose refinement needs more keyframes than this (NICE-SLAM).
 const REFINE_AFTER: usize = 4;
+/// Keyframes that every window holds while frames come in: the current one and the two before.
+const RECENT: usize = 3;
 
 /// By how much the kept depth images are smaller.
 pub(super) fn observation_step(width: u32) -> u32 {
@@ -67,9 +70,12 @@ impl Slam {
                 expected: "a larger keyframes.budget_mib".into(),
             });
         };
+        self.class_counts.add(self.info.classes.len(), frame);
+        let class_weights = self.class_counts.weights(self.config.fusion.balance);
         let device = self.device()?;
         let mut r = Recording::default();
         device.upload_frame(&mut r, slot, frame);
+        device.upload_class_weights(&mut r, &class_weights);
         device.engine.submit(&r)?;
 
         let first = self.keyframes.is_empty();
@@ -94,7 +100,10 @@ impl Slam {
             })
             .collect();
         let rates = Rates { planes: m.rate_planes * factor, decoders: m.rate_decoders * factor };
-        let losses = self.optimise(iterations, rates, &near).await?;
+        let f = &self.config.fusion;
+        let steps = if first { f.first_steps } else { f.steps };
+        let losses = self.optimise(iterations, rates, &near, RECENT, steps).await?;
+        self.mapping_calls += 1;
         if !keyframe && let Some(k) = self.keyframes.pop() {
             self.free_slots.push(k.slot);
         }
@@ -118,7 +127,8 @@ impl Slam {
             let factor = 0.1 + 0.9 * f64::from(left) / f64::from(m.final_iterations);
             let rates =
                 Rates { planes: m.rate_planes * factor, decoders: m.rate_decoders * factor };
-            self.optimise(n, rates, &all).await?;
+            let steps = self.config.fusion.steps * n / m.iterations.max(1);
+            self.optimise(n, rates, &all, 0, steps).await?;
             left -= n;
         }
         self.follow_odometer();
@@ -176,13 +186,15 @@ impl Slam {
         self.bounds_refused
     }
 
-    /// Optimises map and poses over windows drawn from the keyframes `near`, the last keyframe
-    /// (the current frame) and the two before it.
+    /// Optimises map and poses over windows of the `recent` last keyframes (the current frame
+    /// among them) and others drawn from the keyframes `near`.
     async fn optimise(
         &mut self,
         iterations: u32,
         rates: Rates,
         near: &[usize],
+        recent: usize,
+        fusion_steps: u32,
     ) -> Result<Losses, SlamError> {
         let m = self.config.mapping.clone();
         let s = self.config.sampling.clone();
@@ -201,6 +213,8 @@ impl Slam {
         let first_iteration = self.iteration;
         self.iteration += iterations;
         let last_frame = self.keyframes.last().map_or(0, |k| k.frame);
+        let compression = self.compression(&self.config.suppressor);
+        let feature = self.feature(&self.config.fusion);
         let device = self.device()?;
         let mut touched = BTreeSet::new();
         let mut r = Recording::default();
@@ -210,7 +224,7 @@ impl Slam {
         let mut rays = 0;
         for i in 0..iterations {
             let iteration = first_iteration + i;
-            let mut chosen: BTreeSet<usize> = (n.saturating_sub(3)..n).collect();
+            let mut chosen: BTreeSet<usize> = (n.saturating_sub(recent)..n).collect();
             let mut pool: Vec<usize> =
                 near.iter().copied().filter(|k| !chosen.contains(k)).collect();
             let mut draw = 0;
@@ -227,6 +241,16 @@ impl Slam {
                 .iter()
                 .map(|&k| (keyframes[k].0, !refine || k == 0 || Some(k) == oldest))
                 .collect();
+            for step in 0..steps_due(fusion_steps, iterations, i) {
+                // Every other step goes over an earlier frame: the fusion must not forget.
+                let k = if (i + step).is_multiple_of(2) && recent > 0 {
+                    n - 1
+                } else {
+                    let at = random_u32(seed, iteration, step, 22) as usize % chosen.len();
+                    chosen.iter().nth(at).copied().unwrap_or(n - 1)
+                };
+                device.record_fusion_step(&mut r, keyframes[k].0, rates.decoders);
+            }
             touched.extend(chosen);
             device.upload_window(&mut r, &window);
             let frames = window.len() as u32;
@@ -239,9 +263,15 @@ impl Slam {
                 loss: &loss,
                 iteration,
                 first: 0,
+                compression,
+                feature,
             };
             rays = batch.frames * batch.rays_per_frame;
             device.record_forward(&mut r, &batch);
+            device.record_anchor_update(&mut r, &batch);
+            if i + 1 == iterations {
+                device.record_anchor_maintenance(&mut r, &batch);
+            }
             device.record_backward(&mut r, &batch);
             if refine {
                 let (v, w) = (m.rate_translation_m, m.rate_rotation_rad);

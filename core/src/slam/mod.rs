@@ -5,6 +5,7 @@
 mod checkpoint;
 mod mapping;
 mod output;
+mod semantics;
 mod tracking;
 
 pub use checkpoint::{Checkpoint, Dtype, Tensor};
@@ -150,6 +151,8 @@ pub struct Slam {
     /// Batches so far: the counter of the random numbers.
     iteration: u32,
     bounds_refused: bool,
+    class_counts: semantics::ClassCounts,
+    mapping_calls: u32,
     clock: Option<fn() -> f64>,
 }
 
@@ -179,6 +182,8 @@ impl Slam {
             free_slots: Vec::new(),
             iteration: 0,
             bounds_refused: false,
+            class_counts: semantics::ClassCounts::default(),
+            mapping_calls: 0,
             clock: None,
         })
     }

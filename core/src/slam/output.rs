@@ -3,8 +3,9 @@ use super::{Slam, SlamError, VIEW_SLOT, mapping::observation_step};
 use crate::{
     camera::Camera,
     classes::UNLABELLED,
+    config::Inference,
     device::Batch,
-    kernels::shared::FLAG_DENSE,
+    kernels::shared::{FLAG_ANCHORS, FLAG_DENSE},
     layout::RAY_OUT_FLOATS,
     mesh::{self, BlockMesher, ComponentSize, CullProtocol, Keep, Mesh, Visibility},
     pose::Pose,
@@ -40,6 +41,10 @@ impl Slam {
         let s = self.config.sampling.clone();
         let loss = self.config.loss.clone();
         let own = self.info.camera;
+        let inference = match self.config.suppressor.inference {
+            Inference::Anchors => FLAG_ANCHORS,
+            Inference::Head => 0,
+        };
         let device = self.device()?;
         let pixels = camera.pixels();
         let mut view = View {
@@ -57,10 +62,12 @@ impl Slam {
                 rays_per_frame: rays,
                 stratified: s.render_stratified,
                 surface: s.render_surface,
-                flags: FLAG_DENSE,
+                flags: FLAG_DENSE | inference,
                 loss: &loss,
                 iteration: 0,
                 first,
+                compression: 0.0,
+                feature: 0.0,
             };
             let mut r = Recording::default();
             device.upload_pose(&mut r, VIEW_SLOT, pose);

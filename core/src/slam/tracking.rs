@@ -134,6 +134,8 @@ impl Slam {
                 loss: &t.render_loss,
                 iteration: first_iteration + i,
                 first: 0,
+                compression: 0.0,
+                feature: 0.0,
             };
             device.record_forward(&mut r, &batch);
             device.record_backward(&mut r, &batch);

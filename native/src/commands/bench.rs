@@ -176,6 +176,8 @@ fn record(
         loss,
         iteration,
         first: 0,
+        compression: 0.0,
+        feature: 0.0,
     };
     device.record_forward(r, &batch);
     device.record_backward(r, &batch);

@@ -1,0 +1,120 @@
+//! Feature redundancy suppressor (paper III-B) on the device.
+use super::{Batch, Device};
+use crate::{
+    config::{AnchorRule, SuppressorConfig},
+    engine::{Engine, EngineError},
+    kernels::{
+        maintain_anchors::{MAINTAIN_ANCHORS, MaintainAnchorsParams},
+        update_anchors::{UPDATE_ANCHORS, UpdateAnchorsParams},
+    },
+    layout::ANCHOR_FLOATS,
+    recording::{BufferId, Recording},
+};
+use alloc::{vec, vec::Vec};
+use serde::{Deserialize, Serialize};
+
+/// Buffers of the suppressor.
+pub struct Suppressor {
+    /// Anchors, [`ANCHOR_FLOATS`] each.
+    pub anchors: BufferId,
+    /// Votes of the matched rays' labels, one float a slot and class.
+    pub votes: BufferId,
+    counts: BufferId,
+    config: SuppressorConfig,
+}
+
+/// What the suppressor did so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct AnchorCounts {
+    /// Anchors in use.
+    pub alive: u32,
+    /// Anchors made, the first ones among them.
+    pub spawned: u32,
+    /// Anchors dropped as unimportant.
+    pub dropped: u32,
+    /// Anchors merged into a duplicate.
+    pub merged: u32,
+}
+
+impl Suppressor {
+    pub(super) fn new(
+        e: &mut Engine,
+        config: &SuppressorConfig,
+        classes: u32,
+    ) -> Result<Suppressor, EngineError> {
+        let n = config.anchors as usize;
+        let s = Suppressor {
+            anchors: e.create_buffer("anchors", n * ANCHOR_FLOATS)?,
+            votes: e.create_buffer("votes", n * classes as usize)?,
+            counts: e.create_buffer("anchor counts", 4)?,
+            config: config.clone(),
+        };
+        let mut free = vec![0_u32; n * ANCHOR_FLOATS];
+        for a in free.chunks_exact_mut(ANCHOR_FLOATS) {
+            a[16] = 255;
+        }
+        let mut r = Recording::default();
+        r.upload(s.anchors, 0, &free);
+        e.submit(&r)?;
+        Ok(s)
+    }
+
+    /// Slots of anchors.
+    pub fn slots(&self) -> u32 {
+        self.config.anchors
+    }
+}
+
+impl Device {
+    /// Moves the anchors to the features of the last forward pass.
+    pub fn record_anchor_update(&self, r: &mut Recording, b: &Batch<'_>) {
+        let Some(s) = &self.suppressor else { return };
+        let c = &s.config;
+        r.dispatch(
+            &UPDATE_ANCHORS,
+            &UpdateAnchorsParams {
+                rays: b.frames * b.rays_per_frame,
+                anchors: c.anchors,
+                classes: self.classes,
+                rule: u32::from(c.rule == AnchorRule::Mean),
+                beta: c.beta as f32,
+                memory: c.memory as f32,
+                decay: c.decay as f32,
+                variation_decay: 0.9,
+            },
+            &[self.rays, self.ray_state, s.anchors, s.votes],
+            [c.anchors, 1, 1],
+        );
+    }
+
+    /// Drops, merges and spawns anchors from the features of the last forward pass.
+    pub fn record_anchor_maintenance(&self, r: &mut Recording, b: &Batch<'_>) {
+        let Some(s) = &self.suppressor else { return };
+        let c = &s.config;
+        let square = |d: f64| (d * d) as f32;
+        r.dispatch(
+            &MAINTAIN_ANCHORS,
+            &MaintainAnchorsParams {
+                rays: b.frames * b.rays_per_frame,
+                anchors: c.anchors,
+                classes: self.classes,
+                spawns: c.spawns,
+                spawn_distance: square(c.spawn_distance),
+                merge_distance: square(c.merge_distance),
+                stable: c.stable as f32,
+                min_importance: c.min_importance as f32,
+                min_age: f64::from(c.min_age) as f32,
+                ..MaintainAnchorsParams::default()
+            },
+            &[self.rays, self.ray_state, s.anchors, s.votes, s.counts],
+            [1, 1, 1],
+        );
+    }
+
+    /// What the suppressor did so far; `None` without one.
+    pub async fn read_anchor_counts(&mut self) -> Result<Option<AnchorCounts>, EngineError> {
+        let Some(s) = &self.suppressor else { return Ok(None) };
+        let c: Vec<u32> = self.engine.read(s.counts, 0, 4).await?;
+        Ok(Some(AnchorCounts { alive: c[0], spawned: c[1], dropped: c[2], merged: c[3] }))
+    }
+}

@@ -1,0 +1,96 @@
+//! What trains the fusion: classes and colour read from F. F is also the rays' target.
+use super::{
+    CpuDispatch,
+    gate_tokens::sigmoid,
+    load_f32,
+    shared::{class_logit, head_row},
+    store_f32,
+    tokens::{COLOR_AT, FUSED_AT, LOGITS_AT, RAW_HISTOGRAM, RAW_MEAN, TokenParams, sixteen},
+};
+use crate::layout::TARGET_FLOATS;
+#[cfg(not(feature = "std"))]
+use num_traits::Float as _;
+
+kernel! {
+    /// Class-balanced cross-entropy and colour loss of F, their gradients, and the rays' targets.
+    pub static TOKEN_LOSS = "token_loss" {
+        workgroup_size: 64,
+        params: TokenParams,
+        twin: twin,
+        bindings: [
+            parameters: Read,
+            decoders: Read,
+            class_weights: Read,
+            raw: Read,
+            tokens: ReadWrite,
+            token_gradient: ReadWrite,
+            targets: ReadWrite,
+        ],
+    }
+}
+
+fn twin(dispatch: &CpuDispatch<'_>) {
+    let p: TokenParams = dispatch.params();
+    let (w, decoders) = (dispatch.read_f32(0), dispatch.read_f32(1));
+    let (class_weights, raw) = (dispatch.read_f32(2), dispatch.read_f32(3));
+    let (tokens, gradient) = (dispatch.write(4), dispatch.write(5));
+    let targets = dispatch.write(6);
+    let inv = 1.0 / p.tokens() as f32;
+    dispatch.for_each_invocation(|token| {
+        if token >= p.tokens() {
+            return;
+        }
+        let row = token * p.stride as usize;
+        let raw = &raw[token * p.raw_stride as usize..(token + 1) * p.raw_stride as usize];
+        let histogram = &raw[RAW_HISTOGRAM as usize..];
+        let feature = sixteen(tokens, row + FUSED_AT as usize);
+        let valid = raw[RAW_MEAN as usize + 3];
+        let out = &targets[(p.slot as usize * p.tokens() + token) * TARGET_FLOATS..];
+        for (c, f) in feature.iter().enumerate() {
+            store_f32(&out[c], *f);
+        }
+        store_f32(&out[16], valid);
+        (17..20).for_each(|k| store_f32(&out[k], 0.0));
+        if p.train == 0 {
+            return;
+        }
+
+        let logit = |c| class_logit(decoders, &feature, p.classes, c);
+        let (mut best, mut sum, mut mass, mut mean) = (-1e30_f32, 0.0_f32, 0.0, 0.0);
+        for c in 0..p.classes {
+            let l = logit(c);
+            let top = best.max(l);
+            sum = sum * (best - top).exp() + (l - top).exp();
+            best = top;
+            let t = histogram[c as usize] * class_weights[c as usize];
+            mass += t;
+            mean += t * l;
+        }
+        let mut loss = p.weight_class * (mass * (best + sum.ln()) - mean);
+        let mut g = [0.0_f32; 16];
+        for c in 0..p.classes {
+            let t = histogram[c as usize] * class_weights[c as usize];
+            let d = p.weight_class * inv * (mass * (logit(c) - best).exp() / sum - t);
+            store_f32(&gradient[row + (LOGITS_AT + c) as usize], d);
+            let head = head_row(decoders, c);
+            (0..16).for_each(|k| g[k] += d * head[k]);
+        }
+        let head = &w[p.color_head as usize..p.color_head as usize + 68];
+        for k in 0..3 {
+            let z = head[64 + k] + (0..16).map(|c| head[c * 4 + k] * feature[c]).sum::<f32>();
+            let y = sigmoid(z);
+            let e = y - raw[RAW_MEAN as usize + k];
+            loss += p.weight_color * e.abs() / 3.0;
+            let sign = if e > 0.0 { 1.0 } else if e < 0.0 { -1.0 } else { 0.0 };
+            let d = p.weight_color * inv / 3.0 * sign * y * (1.0 - y);
+            store_f32(&tokens[row + COLOR_AT as usize + k], y);
+            store_f32(&gradient[row + COLOR_AT as usize + k], d);
+            (0..16).for_each(|c| g[c] += d * head[c * 4 + k]);
+        }
+        store_f32(&tokens[row + COLOR_AT as usize + 3], loss);
+        for (c, d) in g.iter().enumerate() {
+            let cell = &gradient[row + FUSED_AT as usize + c];
+            store_f32(cell, load_f32(cell) + d);
+        }
+    });
+}

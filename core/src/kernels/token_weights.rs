@@ -1,0 +1,90 @@
+//! Gradients of the weights of a layer on the token grid.
+use super::{
+    CpuDispatch, load_f32, store_f32,
+    tokens::{NO_BIAS, SLOPE, TokenParams},
+};
+use alloc::vec;
+
+kernel! {
+    /// dW = sum over tokens of input x delta, in chunks of tokens.
+    pub static TOKEN_WEIGHTS = "token_weights" {
+        workgroup_size: 64,
+        params: TokenParams,
+        twin: twin,
+        bindings: [raw: Read, tokens: Read, token_gradient: ReadWrite, partials: ReadWrite],
+    }
+}
+
+fn twin(dispatch: &CpuDispatch<'_>) {
+    let p: TokenParams = dispatch.params();
+    let (raw, tokens) = (dispatch.read_f32(0), dispatch.read_f32(1));
+    let (gradient, partials) = (dispatch.write(2), dispatch.write(3));
+    let (inputs, outputs, stride) = (p.inputs as usize, p.outputs as usize, p.stride as usize);
+    let taps = (p.taps * p.taps) as usize;
+    let depthwise = p.depthwise == 1;
+    let biased = p.bias != NO_BIAS;
+    let bias_quads = outputs.div_ceil(4);
+    let per_chunk = taps * inputs * if depthwise { 1 } else { bias_quads }
+        + if biased { bias_quads } else { 0 };
+    let chunks = p.tokens().div_ceil(p.chunk as usize);
+    let reach = p.taps as i32 / 2;
+    dispatch.for_each_workgroup(|group| {
+        // The shader's invocation is a few weights of a chunk; here the workgroup of a chunk's
+        // first invocation does the chunk, a token at a time.
+        let first = group as usize * 64;
+        for chunk in first.div_ceil(per_chunk)..(first + 64).div_ceil(per_chunk).min(chunks) {
+            let width = if depthwise { 1 } else { outputs };
+            let mut sums = vec![0.0_f32; taps * inputs * width];
+            let mut biases = vec![0.0_f32; outputs];
+            let mut delta = vec![0.0_f32; outputs];
+            let mut x = vec![0.0_f32; inputs];
+            let end = ((chunk + 1) * p.chunk as usize).min(p.tokens());
+            for token in chunk * p.chunk as usize..end {
+                let at = token * stride + p.output as usize;
+                for (o, d) in delta.iter_mut().enumerate() {
+                    let slope = if p.activation == 1 && tokens[at + o] < 0.0 { SLOPE } else { 1.0 };
+                    *d = slope * load_f32(&gradient[at + o]);
+                }
+                biases.iter_mut().zip(&delta).for_each(|(b, d)| *b += d);
+                for tap in 0..taps {
+                    let dx = tap as i32 % p.taps as i32 - reach;
+                    let dy = tap as i32 / p.taps as i32 - reach;
+                    let Some(from) = p.neighbour(token, dx, dy) else { continue };
+                    let (values, row) = if p.from_raw == 1 {
+                        (raw, p.raw_stride as usize)
+                    } else {
+                        (tokens, stride)
+                    };
+                    let at = from * row + p.input as usize;
+                    x.copy_from_slice(&values[at..at + inputs]);
+                    let sums = &mut sums[tap * inputs * width..(tap + 1) * inputs * width];
+                    if depthwise {
+                        let both = x.iter().zip(&delta);
+                        sums.iter_mut().zip(both).for_each(|(s, (x, d))| *s += x * d);
+                    } else {
+                        for (x, sums) in x.iter().zip(sums.chunks_exact_mut(outputs)) {
+                            sums.iter_mut().zip(&delta).for_each(|(s, d)| *s += x * d);
+                        }
+                    }
+                }
+            }
+            let row = &partials[chunk * p.row as usize..];
+            for (k, s) in sums.iter().enumerate() {
+                let (tap, i, o) = (k / width / inputs, k / width % inputs, k % width);
+                let to = if depthwise {
+                    tap * inputs + i
+                } else {
+                    tap * inputs * outputs
+                        + i * p.input_stride as usize
+                        + o * p.output_stride as usize
+                };
+                store_f32(&row[p.weights as usize + to], *s);
+            }
+            if biased {
+                for (o, s) in biases.iter().enumerate() {
+                    store_f32(&row[p.bias as usize + o], *s);
+                }
+            }
+        }
+    });
+}

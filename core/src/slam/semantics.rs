@@ -1,0 +1,55 @@
+//! What mapping does for semantics beside rays: class weights, fusion steps, anchors by stage.
+use super::Slam;
+use crate::{
+    config::{FusionConfig, SuppressorConfig},
+    frame::Frame,
+};
+use alloc::vec::Vec;
+#[cfg(not(feature = "std"))]
+use num_traits::Float as _;
+
+/// Classes never weigh more than this against the mean pixel.
+const MAX_CLASS_WEIGHT: f64 = 10.0;
+
+/// How often each class was seen, over all mapped frames.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ClassCounts(Vec<f64>);
+
+impl ClassCounts {
+    /// Adds a frame's labels.
+    pub fn add(&mut self, classes: usize, frame: &Frame) {
+        self.0.resize(classes, 0.0);
+        for label in frame.labels.iter().flatten() {
+            if let Some(n) = self.0.get_mut(*label as usize) {
+                *n += 1.0;
+            }
+        }
+    }
+
+    /// Weights by inverse frequency to the power of `balance`; the mean pixel weighs 1.
+    pub fn weights(&self, balance: f64) -> Vec<f32> {
+        let total: f64 = self.0.iter().sum();
+        let raw: Vec<f64> = self.0.iter().map(|n| (total / n.max(1.0)).powf(balance)).collect();
+        let mean = raw.iter().zip(&self.0).map(|(w, n)| w * n).sum::<f64>() / total.max(1.0);
+        raw.iter().map(|w| (w / mean.max(1e-9)).min(MAX_CLASS_WEIGHT) as f32).collect()
+    }
+}
+
+/// Training steps of the fusion that are due at an iteration, of `steps` spread over `iterations`.
+pub(super) fn steps_due(steps: u32, iterations: u32, iteration: u32) -> u32 {
+    let until = |i: u32| u64::from(i) * u64::from(steps) / u64::from(iterations.max(1));
+    (until(iteration + 1) - until(iteration)) as u32
+}
+
+impl Slam {
+    /// Weight of the compression loss by stage: features must have settled before they are held.
+    pub(super) fn compression(&self, c: &SuppressorConfig) -> f64 {
+        let since = f64::from(self.mapping_calls) - f64::from(c.start);
+        if since < 0.0 { 0.0 } else { c.weight * (since / f64::from(c.ramp.max(1))).min(1.0) }
+    }
+
+    /// Weight of the feature loss: the fusion must have been trained on one frame.
+    pub(super) fn feature(&self, c: &FusionConfig) -> f64 {
+        if self.mapping_calls == 0 { 0.0 } else { c.weight }
+    }
+}

@@ -1,0 +1,213 @@
+// Drops unimportant anchors, merges stable duplicates, spawns anchors for features far from their class's.
+// One workgroup: the decisions are in order, their searches parallel.
+#import shared/rays.wgsl
+
+struct Params {
+    rays: u32,
+    // Slots, at most 256; classes, at most 255; anchors spawned at most.
+    anchors: u32,
+    classes: u32,
+    spawns: u32,
+    // Squared distances.
+    spawn_distance: f32,
+    merge_distance: f32,
+    // Largest movement an update of an anchor that may merge, importance and age below which it stays or goes.
+    stable: f32,
+    min_importance: f32,
+    min_age: f32,
+    spare0: u32,
+    spare1: u32,
+    spare2: u32,
+}
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read> rays: array<Ray>;
+@group(0) @binding(2) var<storage, read_write> ray_state: array<vec4f>;
+// Per anchor: vector (4) | class (bits, 255: free), matches, importance, variation | age.
+@group(0) @binding(3) var<storage, read_write> anchors: array<vec4f>;
+@group(0) @binding(4) var<storage, read_write> votes: array<f32>;
+// Alive, spawned, dropped, merged.
+@group(0) @binding(5) var<storage, read_write> anchor_counts: array<u32>;
+
+const FREE: u32 = 255u;
+const NONE: u32 = 0xffffffffu;
+var<workgroup> of_class: array<u32, 256>;
+var<workgroup> best_value: array<f32, 64>;
+var<workgroup> best_index: array<u32, 64>;
+var<workgroup> other: u32;
+
+fn class_of(i: u32) -> u32 {
+    return bitcast<u32>(anchors[i * ${ANCHOR_VEC4}u + 4u].x);
+}
+fn clear(i: u32) {
+    for (var k = 0u; k < ${ANCHOR_VEC4}u; k++) {
+        anchors[i * ${ANCHOR_VEC4}u + k] = vec4f(0.0);
+    }
+    anchors[i * ${ANCHOR_VEC4}u + 4u].x = bitcast<f32>(FREE);
+    for (var c = 0u; c < params.classes; c++) {
+        votes[i * params.classes + c] = 0.0;
+    }
+}
+fn settled(i: u32) -> bool {
+    let a = i * ${ANCHOR_VEC4}u;
+    return class_of(i) != FREE && anchors[a + 5u].x >= params.min_age && anchors[a + 4u].w < params.stable;
+}
+fn feature_distance(ray: u32, i: u32) -> f32 {
+    var d = 0.0;
+#for j in 0..4
+    let e${j} = ray_state[ray * ${RAY_STATE_VEC4}u + ${STATE_FEATURE+j}u] - anchors[i * ${ANCHOR_VEC4}u + ${j}u];
+    d += dot(e${j}, e${j});
+#end
+    return d;
+}
+// Uniform value of a workgroup variable.
+fn shared_other() -> u32 {
+    return workgroupUniformLoad(&other);
+}
+
+@compute @workgroup_size(WORKGROUP_SIZE)
+fn main(@builtin(local_invocation_index) lane: u32) {
+    if (lane == 0u) {
+        for (var c = 0u; c < 256u; c++) {
+            of_class[c] = 0u;
+        }
+        for (var i = 0u; i < params.anchors; i++) {
+            of_class[min(class_of(i), 255u)] += 1u;
+        }
+        // Unimportant anchors go, but never the last of a class.
+        for (var i = 0u; i < params.anchors; i++) {
+            let a = i * ${ANCHOR_VEC4}u;
+            let class_id = class_of(i);
+            if (class_id == FREE || anchors[a + 5u].x < params.min_age || anchors[a + 4u].z >= params.min_importance) {
+                continue;
+            }
+            if (of_class[class_id] > 1u) {
+                of_class[class_id] -= 1u;
+                clear(i);
+                anchor_counts[2] += 1u;
+            }
+        }
+    }
+    storageBarrier();
+    workgroupBarrier();
+
+    // Stable duplicates become one, weighted by their matches: for each anchor its next duplicate, until there is none.
+    for (var i = 0u; i < params.anchors; i++) {
+        for (var from_index = i + 1u; from_index < params.anchors;) {
+            var first = NONE;
+            if (settled(i)) {
+                for (var j = from_index + lane; j < params.anchors; j += 64u) {
+                    if (first != NONE || !settled(j) || class_of(j) != class_of(i)) {
+                        continue;
+                    }
+                    var d = 0.0;
+                    for (var k = 0u; k < 4u; k++) {
+                        let e = anchors[i * ${ANCHOR_VEC4}u + k] - anchors[j * ${ANCHOR_VEC4}u + k];
+                        d += dot(e, e);
+                    }
+                    if (d < params.merge_distance) {
+                        first = j;
+                    }
+                }
+            }
+            best_index[lane] = first;
+            workgroupBarrier();
+            if (lane == 0u) {
+                other = NONE;
+                for (var k = 0u; k < 64u; k++) {
+                    other = min(other, best_index[k]);
+                }
+                if (other != NONE) {
+                    let a = i * ${ANCHOR_VEC4}u;
+                    let b = other * ${ANCHOR_VEC4}u;
+                    let total = anchors[a + 4u].y + anchors[b + 4u].y;
+                    let share = anchors[b + 4u].y / max(total, 1.0);
+                    for (var k = 0u; k < 4u; k++) {
+                        anchors[a + k] += share * (anchors[b + k] - anchors[a + k]);
+                    }
+                    anchors[a + 4u].y = total;
+                    anchors[a + 4u].z += anchors[b + 4u].z;
+                    for (var c = 0u; c < params.classes; c++) {
+                        votes[i * params.classes + c] += votes[other * params.classes + c];
+                    }
+                    of_class[class_of(other)] -= 1u;
+                    clear(other);
+                    anchor_counts[3] += 1u;
+                }
+            }
+            storageBarrier();
+            let merged = shared_other();
+            from_index = select(merged + 1u, params.anchors, merged == NONE);
+        }
+    }
+
+    // A feature far from its class's anchors becomes one; classes without any come first.
+    for (var round = 0u; round < params.spawns; round++) {
+        var furthest = params.spawn_distance;
+        var chosen = NONE;
+        for (var ray = lane; ray < params.rays; ray += 64u) {
+            let class_id = ray_class(rays[ray]);
+            if ((rays[ray].frame & 0x80000000u) != 0u || class_id >= params.classes) {
+                continue;
+            }
+            let match_state = ray_state[ray * ${RAY_STATE_VEC4}u + ${STATE_ANCHOR}u];
+            let is_first = of_class[class_id] == 0u;
+            let own = select(match_state.z, 1e30, is_first);
+            if (own > furthest && (is_first || match_state.y > params.merge_distance)) {
+                furthest = own;
+                chosen = ray;
+            }
+        }
+        best_value[lane] = furthest;
+        best_index[lane] = chosen;
+        workgroupBarrier();
+        if (lane == 0u) {
+            var slot = 0u;
+            while (slot < params.anchors && class_of(slot) != FREE) {
+                slot++;
+            }
+            // The furthest, of equals the first ray.
+            for (var k = 1u; k < 64u; k++) {
+                if (best_index[k] != NONE && (best_value[k] > best_value[0] || best_index[0] == NONE
+                    || (best_value[k] == best_value[0] && best_index[k] < best_index[0]))) {
+                    best_value[0] = best_value[k];
+                    best_index[0] = best_index[k];
+                }
+            }
+            other = NONE;
+            if (slot < params.anchors && best_index[0] != NONE) {
+                other = slot;
+                let ray = best_index[0];
+                let a = slot * ${ANCHOR_VEC4}u;
+                let class_id = ray_class(rays[ray]);
+                clear(slot);
+                for (var k = 0u; k < 4u; k++) {
+                    anchors[a + k] = ray_state[ray * ${RAY_STATE_VEC4}u + ${STATE_FEATURE}u + k];
+                }
+                anchors[a + 4u] = vec4f(bitcast<f32>(class_id), 1.0, params.min_importance, 2.0 * params.stable);
+                votes[slot * params.classes + class_id] = 1.0;
+                of_class[class_id] += 1u;
+                anchor_counts[1] += 1u;
+            }
+        }
+        storageBarrier();
+        let slot = shared_other();
+        if (slot == NONE) {
+            break;
+        }
+        for (var ray = lane; ray < params.rays; ray += 64u) {
+            let d = feature_distance(ray, slot);
+            let at = ray * ${RAY_STATE_VEC4}u + ${STATE_ANCHOR}u;
+            ray_state[at].y = min(ray_state[at].y, d);
+            if (ray_class(rays[ray]) == class_of(slot)) {
+                ray_state[at].z = min(ray_state[at].z, d);
+            }
+        }
+        workgroupBarrier();
+    }
+    if (lane == 0u) {
+        anchor_counts[0] = 0u;
+        for (var i = 0u; i < params.anchors; i++) {
+            anchor_counts[0] += select(0u, 1u, class_of(i) != FREE);
+        }
+    }
+}

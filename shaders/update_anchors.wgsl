@@ -1,0 +1,98 @@
+// Anchors follow the features matched to them (paper eqs. 11, 12). One workgroup an anchor.
+#import shared/rays.wgsl
+
+struct Params {
+    rays: u32,
+    anchors: u32,
+    classes: u32,
+    // 0: moving average (11), 1: running mean (12).
+    rule: u32,
+    beta: f32,
+    // Matches that the running mean remembers at most.
+    memory: f32,
+    // What importance and votes keep at each update; the same of the temporal variation.
+    decay: f32,
+    variation_decay: f32,
+}
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read> rays: array<Ray>;
+@group(0) @binding(2) var<storage, read> ray_state: array<vec4f>;
+// Per anchor: vector (4) | class (bits, 255: free), matches, importance, variation | age.
+@group(0) @binding(3) var<storage, read_write> anchors: array<vec4f>;
+// Per anchor and class: decayed number of matched rays with that label.
+@group(0) @binding(4) var<storage, read_write> votes: array<f32>;
+
+var<workgroup> sums: array<array<vec4f, 64>, 4>;
+var<workgroup> counts: array<f32, 64>;
+var<workgroup> labels: array<atomic<u32>, 256>;
+
+@compute @workgroup_size(WORKGROUP_SIZE)
+fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let at = wid.x * ${ANCHOR_VEC4}u;
+    let alive = bitcast<u32>(anchors[at + 4u].x) != 255u;
+    for (var c = lane; c < 256u; c += 64u) {
+        atomicStore(&labels[c], 0u);
+    }
+    workgroupBarrier();
+#for j in 0..4
+    var s${j} = vec4f(0.0);
+#end
+    var count = 0.0;
+    if (alive) {
+        for (var ray = lane; ray < params.rays; ray += 64u) {
+            let state = ray * ${RAY_STATE_VEC4}u;
+            if (bitcast<u32>(ray_state[state + ${STATE_ANCHOR}u].x) != wid.x || (rays[ray].frame & 0x80000000u) != 0u) {
+                continue;
+            }
+            count += 1.0;
+            atomicAdd(&labels[rays[ray].label & 255u], 1u);
+#for j in 0..4
+            s${j} += ray_state[state + ${STATE_FEATURE+j}u];
+#end
+        }
+    }
+#for j in 0..4
+    sums[${j}][lane] = s${j};
+#end
+    counts[lane] = count;
+    workgroupBarrier();
+    for (var half = 32u; half > 0u; half /= 2u) {
+        if (lane < half) {
+#for j in 0..4
+            sums[${j}][lane] += sums[${j}][lane + half];
+#end
+            counts[lane] += counts[lane + half];
+        }
+        workgroupBarrier();
+    }
+    if (lane != 0u || !alive) {
+        return;
+    }
+    count = counts[0];
+    var info = anchors[at + 4u];
+    var moved = 0.0;
+    if (count > 0.0) {
+        let rate = select(1.0 - pow(1.0 - params.beta, count), count / (info.y + count), params.rule == 1u);
+#for j in 0..4
+        let step${j} = rate * (sums[${j}][0] / count - anchors[at + ${j}u]);
+        moved += dot(step${j}, step${j});
+        anchors[at + ${j}u] += step${j};
+#end
+    }
+    info.y = min(info.y + count, params.memory);
+    info.z = info.z * params.decay + count;
+    info.w = info.w * params.variation_decay + (1.0 - params.variation_decay) * sqrt(moved);
+    var best = 0.0;
+    var class_id = bitcast<u32>(info.x);
+    for (var c = 0u; c < params.classes; c++) {
+        let v = votes[wid.x * params.classes + c] * params.decay + f32(atomicLoad(&labels[c]));
+        votes[wid.x * params.classes + c] = v;
+        if (v > best) {
+            best = v;
+            class_id = c;
+        }
+    }
+    info.x = bitcast<f32>(class_id);
+    anchors[at + 4u] = info;
+    anchors[at + 5u].x += 1.0;
+}
