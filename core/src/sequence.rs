@@ -75,6 +75,10 @@ pub trait Sequence {
     fn info(&self) -> &SequenceInfo;
     /// Decode frame `index` (0-based).
     fn frame(&mut self, index: usize) -> Result<Frame, SequenceError>;
+    /// Labels of frame `index` alone, as in [`Frame::labels`].
+    fn labels(&mut self, index: usize) -> Result<Option<Vec<u8>>, SequenceError> {
+        Ok(self.frame(index)?.labels)
+    }
     /// Ground-truth pose of frame `index` without decoding its images.
     fn truth(&self, index: usize) -> Option<Pose>;
     /// Time stamp of frame `index` \[s\] (the frame number where there are no stamps).

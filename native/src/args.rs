@@ -234,6 +234,11 @@ pub struct SelectionArgs {
         help_heading = "Recording"
     )]
     pub labels: String,
+    /// Labels that rendered classes, and the labels of --labels themselves, are scored against;
+    /// classes are matched by their ids [default: the recording's own, if it has any, else those
+    /// of --labels].
+    #[arg(long, value_name = "dataset|DIR|none", help_heading = "Recording")]
+    pub truth_labels: Option<String>,
 }
 
 /// `demo`.
@@ -277,9 +282,13 @@ pub struct EvalArgs {
     /// Align our mesh to the true one first (point-to-point ICP, 0.1 m), as the peers do.
     #[arg(long)]
     pub icp: bool,
-    /// Labels to compare with: `dataset` or a folder of label images.
-    #[arg(long, value_name = "dataset|DIR", default_value = "dataset")]
-    pub labels: String,
+    /// Labels to compare with: `dataset` (the recording's own), a folder of label images, or
+    /// `none` [default: the recording's own, if it has any, else those of --labels].
+    #[arg(long, value_name = "dataset|DIR|none")]
+    pub truth_labels: Option<String>,
+    /// Labels that the run was given, to be scored too [default: as its config.toml says].
+    #[arg(long, value_name = "none|dataset|DIR")]
+    pub labels: Option<String>,
 }
 
 /// Which parts of a mesh count as observed; both meshes are culled alike.

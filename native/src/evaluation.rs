@@ -1,14 +1,14 @@
 //! The figures of a run, by the core's metrics.
-use crate::output::{
-    metrics::{Metrics, RenderRecord, SemanticFigures},
-    pictures::unlabelled_id,
+use crate::{
+    class_truth::ClassTruth,
+    output::metrics::{Metrics, RenderRecord, SemanticFigures},
 };
 use anyhow::{Context, Result, bail};
 use mte_slam_core::{
     frame::{Frame, SequenceInfo},
     mesh::{self, CullProtocol, Keep, Mesh, Visibility},
     metrics::{
-        self, AteReport, ConfusionMatrix, DepthMeter, PosePair, PsnrMeter, SurfaceOptions,
+        self, AteReport, DepthMeter, PosePair, PsnrMeter, SemanticMeter, SurfaceOptions,
         SurfaceReport, TrajectoryError, align_rigid, ate, evaluate_surface,
     },
     pose::Pose,
@@ -53,37 +53,54 @@ pub fn trajectory_of_pairs(pairs: &[PosePair]) -> Result<TrajectoryScore, Trajec
 pub struct ViewScores {
     depth: DepthMeter,
     color: PsnrMeter,
-    classes: ConfusionMatrix,
+    truth: ClassTruth,
+    classes: SemanticMeter,
+    input_labels: SemanticMeter,
     frames: Vec<usize>,
     info: SequenceInfo,
 }
 
 impl ViewScores {
-    /// No views yet.
-    pub fn new(info: &SequenceInfo) -> ViewScores {
+    /// No views yet; classes will be scored against `truth`.
+    pub fn new(info: &SequenceInfo, truth: ClassTruth) -> ViewScores {
         ViewScores {
             depth: DepthMeter::default(),
             color: PsnrMeter::default(),
-            classes: ConfusionMatrix::new(info.classes.len()),
+            classes: SemanticMeter::new(truth.table.len()),
+            input_labels: SemanticMeter::new(truth.table.len()),
+            truth,
             frames: Vec::new(),
             info: info.clone(),
         }
     }
 
-    /// Add a view of `frame`.
-    pub fn add(&mut self, frame: &Frame, view: &View) -> Result<()> {
+    /// What is scored against.
+    pub fn truth(&mut self) -> &mut ClassTruth {
+        &mut self.truth
+    }
+
+    /// Add a view of `frame`, whose classes are those of the truth's table, as are `labels`, the
+    /// true ones of the frame.
+    pub fn add(&mut self, frame: &Frame, view: &View, labels: Option<&[u8]>) -> Result<()> {
         let place = || format!("scoring the view of frame {}", frame.index);
         self.depth.add(&view.depth_m, &frame.depth, self.info.depth_unit_m).with_context(place)?;
         self.color.add(&view.color, &frame.color).with_context(place)?;
-        if let Some(labels) = &frame.labels {
-            self.classes.add(labels, &view.class).with_context(place)?;
+        if let Some(labels) = labels {
+            let width = self.info.camera.width as usize;
+            self.classes.add(width, labels, &view.class).with_context(place)?;
+            // A frame without labels tells nothing about those that there are.
+            if let Some(input) = frame.labels.as_ref().filter(|_| self.truth.is_own()) {
+                let input = self.truth.of_map(input);
+                self.input_labels.add(width, labels, &input).with_context(place)?;
+            }
         }
         self.frames.push(frame.index);
         Ok(())
     }
 
-    /// Put the figures, or why there are none, into `metrics`.
-    pub fn report(self, metrics: &mut Metrics) {
+    /// Put the figures, or why there are none, into `metrics`. `unlabelled_id` is that of the
+    /// class pictures.
+    pub fn report(self, unlabelled_id: u16, metrics: &mut Metrics) {
         if self.frames.is_empty() {
             for section in ["depth", "color", "semantics"] {
                 metrics.absent.insert(section, "no frame was rendered".to_owned());
@@ -96,21 +113,21 @@ impl ViewScores {
             metrics.absent.insert("depth", reason.to_owned());
         }
         metrics.color = self.color.report();
-        match self.classes.report() {
-            Some(report) => {
-                let classes = self.info.classes.classes.iter().zip(&report.iou_percent);
-                let iou_percent_by_name =
-                    classes.filter_map(|(c, iou)| Some((c.name.clone(), (*iou)?))).collect();
-                metrics.semantics = Some(SemanticFigures { report, iou_percent_by_name });
-            }
-            None => {
-                metrics.absent.insert("semantics", "there are no labels".to_owned());
-            }
+        let figures = |meter: &SemanticMeter| {
+            let report = meter.report()?;
+            Some(SemanticFigures::new(&self.truth.name, report, &self.truth.table))
+        };
+        metrics.semantics = figures(&self.classes);
+        metrics.input_labels = figures(&self.input_labels);
+        if metrics.semantics.is_none() {
+            let reason = self.truth.reason().unwrap_or("there are no labels");
+            metrics.absent.insert("semantics", reason.to_owned());
         }
+        metrics.warnings.extend(self.truth.warnings());
         metrics.renders = Some(RenderRecord {
             protocol: "at estimated poses, without depth input",
             frames: self.frames,
-            unlabelled_id: unlabelled_id(&self.info.classes),
+            unlabelled_id,
         });
     }
 }

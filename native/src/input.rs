@@ -1,11 +1,13 @@
 //! Opening what is read.
 use crate::{
-    args::SelectionArgs, errors::usage, evaluation::MeshTruth, screen::Screen, source::FolderSource,
+    args::SelectionArgs, class_truth::ClassTruth, errors::usage, evaluation::MeshTruth,
+    screen::Screen, source::FolderSource,
 };
 use anyhow::{Result, anyhow};
 use mte_slam_core::{
     classes::UNLABELLED,
     dataset::{self, LabelSource, Layout, OpenOptions},
+    frame::SequenceInfo,
     mesh::Mesh,
     sequence::Sequence,
     synth::{SyntheticMesh, SyntheticOptions, SyntheticSequence},
@@ -22,7 +24,17 @@ pub fn open(path: &Path, selection: &SelectionArgs, screen: Screen) -> Result<Bo
             "note: {name}: {n} links that lead out of it, such as {first}, are skipped"
         ));
     }
-    let labels = match selection.labels.as_str() {
+    open_source(path, source, layout, &selection.labels, selection)
+}
+
+fn open_source(
+    path: &Path,
+    source: FolderSource,
+    layout: Option<Layout>,
+    labels: &str,
+    selection: &SelectionArgs,
+) -> Result<Box<dyn Sequence>> {
+    let labels = match labels {
         "none" => LabelSource::None,
         "dataset" => LabelSource::Dataset,
         folder => LabelSource::Folder(Box::new(FolderSource::open(Path::new(folder))?)),
@@ -41,6 +53,35 @@ pub fn open(path: &Path, selection: &SelectionArgs, screen: Screen) -> Result<Bo
         // Errors about one file name it below the folder only.
         if message.contains(&name) { anyhow!(message) } else { anyhow!("{name}: {message}") }
     })
+}
+
+/// The labels that classes are scored against, for the recording that `open` opened as `input`.
+pub fn open_truth(
+    path: &Path,
+    selection: &SelectionArgs,
+    input: &SequenceInfo,
+) -> Result<ClassTruth> {
+    let chosen = selection.truth_labels.as_deref();
+    let wanted = match chosen {
+        Some("none") => return Ok(ClassTruth::none("--truth-labels none was given", input)),
+        Some(wanted) => wanted,
+        None => "dataset",
+    };
+    if wanted == selection.labels {
+        if chosen.is_some() && input.classes.is_empty() {
+            usage!("--truth-labels {wanted}: found no label images in the recording");
+        }
+        return Ok(ClassTruth::of_input(wanted, input));
+    }
+    let layout = selection.layout.as_deref().map(layout_named).transpose()?;
+    let truth = open_source(path, FolderSource::open(path)?, layout, wanted, selection)?;
+    if truth.info().classes.is_empty() {
+        if chosen.is_some() {
+            usage!("--truth-labels {wanted}: found no label images in the recording");
+        }
+        return Ok(ClassTruth::of_input(&selection.labels, input));
+    }
+    ClassTruth::of_sequence(wanted, truth, input)
 }
 
 fn layout_named(name: &str) -> Result<Layout> {

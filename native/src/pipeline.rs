@@ -1,6 +1,7 @@
 //! From a sequence to a filled output folder: what `run` and `demo` share.
 use crate::{
     args::{EngineArgs, OutputArgs},
+    class_truth::ClassTruth,
     configuration::{self, Effective},
     engine,
     evaluation::{self, MeshTruth, ViewScores},
@@ -47,6 +48,8 @@ pub struct Job<'a> {
     pub output: &'a OutputArgs,
     /// Output folder when the flags name none.
     pub default_out: PathBuf,
+    /// Labels that classes are scored against.
+    pub class_truth: ClassTruth,
     /// True mesh, if there is one, or why there is none.
     pub truth_mesh: Result<MeshTruth, String>,
 }
@@ -93,8 +96,12 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
         estimates.iter().filter(|e| e.status == TrackingStatus::Lost).map(|e| e.frame).collect();
 
     write_trajectory(&folder, sequence.as_ref(), &estimates, &truth, &mut metrics)?;
-    let scores = render_views(&mut slam, sequence.as_mut(), &folder, &estimates, output, screen)?;
-    scores.report(&mut metrics);
+    let mut scores = ViewScores::new(&info, job.class_truth);
+    if output.render_every > 0 {
+        let chosen: Vec<_> = estimates.iter().step_by(output.render_every).copied().collect();
+        render_views(&mut slam, sequence.as_mut(), &folder, &chosen, &mut scores, screen)?;
+    }
+    scores.report(pictures::unlabelled_id(&info.classes), &mut metrics);
     if output.no_mesh {
         metrics.absent.insert("mesh", "--no-mesh was given".to_owned());
     } else {
@@ -125,7 +132,7 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
     record.config_hash = configuration::hash(&effective.config)?;
     folder.write("config.toml", config_file(&effective.config, &record)?.as_bytes())?;
 
-    metrics.warnings = sequence.warnings();
+    metrics.warnings.splice(0..0, sequence.warnings());
     metrics.time = Some(time_figures(&timings, start));
     metrics.memory = Some(memory_figures(slam.memory_bytes() as u64));
     let json = metrics.to_json()?;
@@ -269,41 +276,49 @@ fn write_trajectory(
     Ok(())
 }
 
-/// Render every K-th frame at its estimated pose; write the pictures, and score them.
+/// Render frames at their estimated poses; write the pictures, and score them.
 fn render_views(
     slam: &mut Slam,
     sequence: &mut dyn Sequence,
     folder: &OutputFolder,
-    estimates: &[PoseEstimate],
-    output: &OutputArgs,
+    chosen: &[PoseEstimate],
+    scores: &mut ViewScores,
     screen: Screen,
-) -> Result<ViewScores> {
+) -> Result<()> {
     let info = sequence.info().clone();
-    let mut scores = ViewScores::new(&info);
-    if output.render_every == 0 {
-        return Ok(scores);
-    }
-    let chosen: Vec<_> = estimates.iter().step_by(output.render_every).collect();
     let mut progress = screen.progress("rendering", chosen.len());
     for (i, estimate) in chosen.iter().enumerate() {
-        let frame = sequence.frame(estimate.frame).with_context(|| info.name.clone())?;
-        let view = block_on(slam.render(&estimate.world_from_camera, &info.camera))
+        let mut frame = sequence.frame(estimate.frame).with_context(|| info.name.clone())?;
+        let mut view = block_on(slam.render(&estimate.world_from_camera, &info.camera))
             .with_context(|| format!("rendering frame {}", estimate.frame))?;
         let stem = format!("renders/{:06}", estimate.frame);
         write_view(&view, &info.classes, &mut |kind, bytes| {
             folder.write(&format!("{stem}.{kind}.png"), bytes)
         })?;
+        let truth = scores.truth();
+        let labels = truth.of_frame(&frame)?;
+        view.class = truth.of_map(&view.class);
+        scores.add(&frame, &view, labels.as_deref())?;
+        let truth = scores.truth();
+        frame.labels = frame.labels.map(|l| truth.of_map(&l));
         let title = format!(
             "{}  frame {}  rendered at the estimated pose, without depth input",
             info.name, estimate.frame
         );
-        let picture = sheet::sheet(&title, &frame, info.depth_unit_m, &view, &info.classes)?;
+        let picture = sheet::sheet(&sheet::Sheet {
+            title: &title,
+            frame: &frame,
+            depth_unit_m: info.depth_unit_m,
+            view: &view,
+            table: &truth.table,
+            true_labels: labels.as_deref(),
+            own_truth: truth.is_own(),
+        })?;
         folder.write(&format!("{stem}.sheet.png"), &picture)?;
-        scores.add(&frame, &view)?;
         progress.set(i as u64 + 1, String::new);
     }
     progress.finish();
-    Ok(scores)
+    Ok(())
 }
 
 /// Colour, depth and, with classes, class picture of a view, given to `write` with their kind.
@@ -344,6 +359,7 @@ pub fn sequence_record(info: &SequenceInfo, record: &RunRecord) -> SequenceRecor
         stride: record.stride,
         scale: record.scale,
         labels: record.labels.clone(),
+        truth_labels: record.truth_labels.clone(),
         classes: info.classes.len(),
     }
 }

@@ -29,6 +29,8 @@ pub struct RunRecord {
     pub scale: f64,
     /// `none`, `dataset` or a folder.
     pub labels: String,
+    /// Labels that classes were scored against: `none`, `dataset` or a folder.
+    pub truth_labels: String,
     /// `gpu` or `cpu`.
     pub engine: String,
     /// Adapter, or processor architecture.
@@ -52,6 +54,7 @@ impl Default for RunRecord {
             frames: 0,
             scale: 1.0,
             labels: "dataset".to_owned(),
+            truth_labels: "dataset".to_owned(),
             engine: String::new(),
             adapter: String::new(),
             backend: String::new(),

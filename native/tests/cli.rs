@@ -266,6 +266,69 @@ fn eval_mesh_and_render_work_from_the_files_of_a_run() {
     fail(folder.path(), &["render", "demo", "--frame", "77", "--engine", "cpu"], 1, &range);
 }
 
+/// Labels of every frame changed by `change(pixel, raw id)`, in a folder `name`.
+fn write_labels(folder: &Path, name: &str, change: impl Fn(u32, u32, u8) -> u16) {
+    fs::create_dir_all(folder.join(name)).unwrap();
+    for i in 0..FRAMES {
+        let file = format!("semantic_class_{i:06}.png");
+        let image = image::open(folder.join("room/semantic_class").join(&file)).unwrap();
+        let image = image.into_luma8();
+        let changed = image::ImageBuffer::<image::Luma<u16>, Vec<u16>>::from_fn(
+            image.width(),
+            image.height(),
+            |x, y| image::Luma([change(x, y, image.get_pixel(x, y).0[0])]),
+        );
+        changed.save(folder.join(name).join(&file)).unwrap();
+    }
+}
+
+fn json_of(folder: &Path, arguments: &[&str]) -> Value {
+    serde_json::from_slice(&succeed(folder, arguments).stdout).unwrap()
+}
+
+#[test]
+fn labels_may_be_scored_against_others() {
+    let folder = recording();
+    let f = folder.path();
+    // Three of four columns are right, the fourth is of one class.
+    let known = image::open(f.join("room/semantic_class/semantic_class_000000.png")).unwrap();
+    let known = u16::from(known.into_luma8().get_pixel(0, 0).0[0]);
+    write_labels(f, "noisy", |x, _, id| if x % 4 == 3 { known } else { u16::from(id) });
+    let json = json_of(f, &run_arguments(&["--json", "--no-mesh", "--labels", "noisy"]));
+    assert_eq!(json["semantics"]["truth"], "dataset");
+    assert_eq!(json["sequence"]["truth_labels"], "dataset");
+    let input = &json["input_labels"];
+    let accuracy = input["pixel_accuracy_percent"].as_f64().unwrap();
+    assert!((75.0..90.0).contains(&accuracy), "{accuracy}");
+    assert!(input["boundary"]["iou_percent"].as_f64().unwrap() < accuracy);
+    assert_eq!(input["images"], json["semantics"]["images"]);
+    assert!(json["semantics"]["classes"][0]["id"].is_u64());
+    let eval = json_of(f, &["eval", "out", "room", "--json"]);
+    assert_eq!(eval["input_labels"], *input, "the run's labels are found again");
+    assert_eq!(eval["semantics"]["miou_percent"], json["semantics"]["miou_percent"]);
+    // Against themselves, as before.
+    let eval = json_of(f, &["eval", "out", "room", "--json", "--truth-labels", "noisy"]);
+    assert_eq!((&eval["semantics"]["truth"], eval.get("input_labels")), (&"noisy".into(), None));
+    assert_ne!(eval["semantics"]["miou_percent"], json["semantics"]["miou_percent"]);
+    let eval = json_of(f, &["eval", "out", "room", "--json", "--truth-labels", "none"]);
+    assert_eq!(eval["absent"]["semantics"], "--truth-labels none was given");
+    // Where the run's labels have gone, the map's classes can still be scored.
+    fs::remove_dir_all(f.join("noisy")).unwrap();
+    let eval = json_of(f, &["eval", "out", "room", "--json"]);
+    assert_eq!(eval["semantics"]["miou_percent"], json["semantics"]["miou_percent"]);
+    assert!(eval.get("input_labels").is_none());
+
+    // Without labels of its own a recording is scored against what it was given.
+    write_labels(f, "given", |_, _, id| u16::from(id));
+    fs::remove_dir_all(f.join("room/semantic_class")).unwrap();
+    let arguments = ["--json", "--no-mesh", "--force", "--labels", "given"];
+    let json = json_of(f, &run_arguments(&arguments));
+    assert_eq!((&json["semantics"]["truth"], json.get("input_labels")), (&"given".into(), None));
+    fs::remove_dir_all(f.join("out")).unwrap();
+    let asked = ["--labels", "given", "--truth-labels", "dataset"];
+    fail(f, &run_arguments(&asked), 2, &["--truth-labels dataset", "no label images"]);
+}
+
 #[test]
 fn wrong_command_lines_are_usage_errors() {
     let folder = tempfile::tempdir().unwrap();

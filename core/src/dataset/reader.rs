@@ -263,15 +263,19 @@ impl Sequence for Reader {
         }
         let depth = self.fit_nearest(depth);
 
-        let labels = match (&mut self.labels, &entry.label) {
-            (Some(labels), Some(file)) => {
-                Some(labels.read(&self.folder, file, frame, self.depth_size)?)
-            }
-            _ => None,
-        };
-        let labels = labels.map(|l| self.fit_nearest(l));
+        let labels = self.labels(index)?;
         let (number, time_s, truth) = (entry.number, entry.time_s, entry.truth);
         Ok(Frame { index, number, time_s, color, depth, labels, truth })
+    }
+
+    fn labels(&mut self, index: usize) -> Result<Option<Vec<u8>>, SequenceError> {
+        let frames = self.frames.len();
+        let entry = self.frames.get(index).ok_or(SequenceError::OutOfRange { index, frames })?;
+        let (Some(labels), Some(file)) = (&mut self.labels, &entry.label) else {
+            return Ok(None);
+        };
+        let image = labels.read(&self.folder, file, entry.number, self.depth_size)?;
+        Ok(Some(self.fit_nearest(image)))
     }
 
     fn truth(&self, index: usize) -> Option<Pose> {

@@ -1,13 +1,15 @@
 //! Evaluation: every figure of a run, each with the name of its protocol. Published tables mix
 //! protocols, so a figure without one means nothing.
+mod boundary;
 mod bvh;
 mod image;
 mod semantic;
 mod surface;
 mod trajectory;
 
+pub use boundary::{BOUNDARY_PIXELS, BoundaryMeter, BoundaryReport};
 pub use image::{DepthMeter, DepthReport, MAX_PSNR_DB, PsnrMeter, PsnrReport};
-pub use semantic::{ConfusionMatrix, SemanticReport};
+pub use semantic::{ConfusionMatrix, SMALL_SHARE_PERCENT, SemanticMeter, SemanticReport};
 pub use surface::{
     SurfaceFigures, SurfaceOptions, SurfaceReport, evaluate_surface, icp, sample_surface,
 };

@@ -1,8 +1,11 @@
 //! Errors of rendered class images.
-use super::MetricsError;
+use super::{BoundaryMeter, BoundaryReport, MetricsError};
 use crate::classes::UNLABELLED;
 use alloc::{string::String, vec, vec::Vec};
 use serde::Serialize;
+
+/// Classes with a smaller share of the true pixels than this count as thin or small \[%\].
+pub const SMALL_SHARE_PERCENT: f64 = 0.5;
 
 /// Counts of true against predicted classes.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -33,8 +36,62 @@ pub struct SemanticReport {
     pub pixel_accuracy_percent: f64,
     /// Mean over the true classes of the share of each one's pixels that are right \[%\].
     pub mean_class_accuracy_percent: f64,
+    /// Mean IoU \[%\] over the thin and small classes: those that occur in the truth with less
+    /// than [`SMALL_SHARE_PERCENT`] of its pixels. `None` when there are none.
+    pub small_miou_percent: Option<f64>,
+    /// Compact indices of those classes.
+    #[serde(skip)]
+    pub small_classes: Vec<u8>,
+    /// Outlines, where the images' width was known.
+    pub boundary: Option<BoundaryReport>,
+    /// True pixels of each compact class index.
+    #[serde(skip)]
+    pub pixels_of_class: Vec<u64>,
+    /// Share of the class's true pixels that are right \[%\]; `None` without any.
+    #[serde(skip)]
+    pub accuracy_percent_of_class: Vec<Option<f64>>,
     /// IoU \[%\] of each compact class index; `None` with an empty union.
     pub iou_percent: Vec<Option<f64>>,
+}
+
+/// A [`ConfusionMatrix`] and a [`BoundaryMeter`] over the same images.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SemanticMeter {
+    confusion: ConfusionMatrix,
+    boundary: BoundaryMeter,
+}
+
+impl SemanticMeter {
+    /// No images yet, of compact classes 0..`classes`.
+    pub fn new(classes: usize) -> SemanticMeter {
+        let boundary = BoundaryMeter::new(classes);
+        SemanticMeter { confusion: ConfusionMatrix::new(classes), boundary }
+    }
+
+    /// Add an image of compact class indices, `width` pixels a row; see [`ConfusionMatrix::add`].
+    ///
+    /// # Errors
+    /// Images of different size, or no whole number of rows.
+    pub fn add(
+        &mut self,
+        width: usize,
+        truth: &[u8],
+        predicted: &[u8],
+    ) -> Result<(), MetricsError> {
+        self.boundary.add(width, truth, predicted)?;
+        self.confusion.add(truth, predicted)
+    }
+
+    /// The matrix so far.
+    pub fn confusion(&self) -> &ConfusionMatrix {
+        &self.confusion
+    }
+
+    /// The figures so far, `None` when no pixel had a true class.
+    pub fn report(&self) -> Option<SemanticReport> {
+        let report = self.confusion.report()?;
+        Some(SemanticReport { boundary: self.boundary.report(), ..report })
+    }
 }
 
 impl ConfusionMatrix {
@@ -64,6 +121,11 @@ impl ConfusionMatrix {
         Ok(())
     }
 
+    /// Number of classes.
+    pub fn classes(&self) -> usize {
+        self.classes
+    }
+
     /// Pixels of true class `truth` predicted as `predicted`; `classes` stands for no class.
     pub fn count(&self, truth: usize, predicted: usize) -> u64 {
         self.counts[truth * (self.classes + 1) + predicted]
@@ -88,6 +150,11 @@ impl ConfusionMatrix {
             })
             .collect();
         let occurs = |c: &usize| of_truth[*c] > 0;
+        let small: Vec<u8> = (0..n)
+            .filter(occurs)
+            .filter(|&c| percent(of_truth[c], pixels) < SMALL_SHARE_PERCENT)
+            .map(|c| c as u8)
+            .collect();
         let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
         Some(SemanticReport {
             protocol: "mIoU: one confusion matrix over all images, unlabelled truth ignored".into(),
@@ -102,6 +169,14 @@ impl ConfusionMatrix {
             mean_class_accuracy_percent: mean(
                 (0..n).filter(occurs).map(|c| percent(right[c], of_truth[c])).collect(),
             ),
+            small_miou_percent: (!small.is_empty())
+                .then(|| mean(small.iter().filter_map(|&c| iou[usize::from(c)]).collect())),
+            small_classes: small,
+            boundary: None,
+            accuracy_percent_of_class: (0..n)
+                .map(|c| (of_truth[c] > 0).then(|| percent(right[c], of_truth[c])))
+                .collect(),
+            pixels_of_class: of_truth,
             iou_percent: iou,
         })
     }
@@ -128,5 +203,23 @@ mod tests {
         assert!((r.miou_of_true_classes_percent - (50.0 + third) / 2.0).abs() < 1e-9);
         assert_eq!(r.pixel_accuracy_percent, 50.0);
         assert_eq!(r.mean_class_accuracy_percent, 50.0);
+        assert_eq!(r.pixels_of_class, [4, 2, 0, 0]);
+        assert_eq!(r.accuracy_percent_of_class, [Some(50.0), Some(50.0), None, None]);
+        assert_eq!((r.small_miou_percent, r.small_classes.len()), (None, 0));
+    }
+
+    #[test]
+    fn small_classes_are_those_below_half_a_percent() {
+        let mut m = SemanticMeter::new(3);
+        // 4 of 1000 pixels are class 1, half of them right; 5 are class 2, exactly 0.5 %.
+        let mut truth = vec![0u8; 1000];
+        truth[..4].fill(1);
+        truth[100..105].fill(2);
+        let mut predicted = truth.clone();
+        predicted[..2].fill(0);
+        m.add(100, &truth, &predicted).unwrap();
+        let r = m.report().unwrap();
+        assert_eq!((r.small_classes, r.small_miou_percent), (vec![1], Some(50.0)));
+        assert!(r.boundary.is_some_and(|b| b.iou_percent < 100.0));
     }
 }

@@ -1,6 +1,7 @@
 //! `mte-slam demo`.
 use crate::{
     args::DemoArgs,
+    class_truth::ClassTruth,
     configuration, input,
     pipeline::{self, Job},
     record::RunRecord,
@@ -28,6 +29,7 @@ pub fn run(args: &DemoArgs, screen: Screen) -> Result<()> {
     } else {
         Ok(input::true_mesh(sequence.ground_truth_mesh()))
     };
+    let class_truth = ClassTruth::of_input("dataset", sequence.info());
     let job = Job {
         sequence: Box::new(sequence),
         record,
@@ -35,6 +37,7 @@ pub fn run(args: &DemoArgs, screen: Screen) -> Result<()> {
         engine: &args.engine,
         output: &args.output,
         default_out,
+        class_truth,
         truth_mesh,
     };
     pipeline::run(job, screen)

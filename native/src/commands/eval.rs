@@ -1,9 +1,12 @@
 //! `mte-slam eval`: the figures again, from files alone.
 use crate::{
     args::{CullChoice, EvalArgs, SelectionArgs},
+    class_truth::ClassTruth,
     evaluation::{self, MeshTruth, ViewScores},
     input,
-    output::{folder::replace_file, metrics::Metrics, trajectory::read_tum},
+    output::{
+        folder::replace_file, metrics::Metrics, pictures::unlabelled_id, trajectory::read_tum,
+    },
     pipeline::sequence_record,
     record::{self, RunRecord},
     screen::Screen,
@@ -34,18 +37,29 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
         );
     }
     let record = record::read_run(out)?.unwrap_or_default();
-    let selection = SelectionArgs {
+    let mut selection = SelectionArgs {
         layout: args.layout.clone(),
         frames: (record.frames > 0).then_some(record.frames),
         stride: record.stride,
         start: record.start,
         scale: record.scale,
-        labels: args.labels.clone(),
+        labels: args.labels.clone().unwrap_or_else(|| record.labels.clone()),
+        truth_labels: args.truth_labels.clone(),
     };
-    let mut sequence = input::open(&args.dataset, &selection, screen)?;
+    let mut sequence = match input::open(&args.dataset, &selection, screen) {
+        // Where the run's labels have gone the rest can still be measured.
+        Err(reason) if args.labels.is_none() && selection.labels != "dataset" => {
+            screen.note(&format!("note: without the run's own labels: {reason:#}"));
+            selection.labels = "none".to_owned();
+            input::open(&args.dataset, &selection, screen)?
+        }
+        opened => opened?,
+    };
     let info = sequence.info().clone();
+    let class_truth = input::open_truth(&args.dataset, &selection, &info)?;
     let truth_mesh = MeshTruth::find(args.mesh.as_deref(), &args.dataset)?;
-    let record = RunRecord { labels: args.labels.clone(), ..record };
+    let (labels, truth_labels) = (selection.labels.clone(), class_truth.name.clone());
+    let record = RunRecord { labels, truth_labels, ..record };
     let mut metrics = Metrics {
         program: format!("mte-slam {} eval", env!("CARGO_PKG_VERSION")),
         sequence: sequence_record(&info, &record),
@@ -53,7 +67,7 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
         ..Metrics::default()
     };
     evaluate_trajectory(out, sequence.as_ref(), &mut metrics)?;
-    evaluate_renders(out, sequence.as_mut(), screen, &mut metrics)?;
+    evaluate_renders(out, sequence.as_mut(), class_truth, screen, &mut metrics)?;
     let path = out.join("mesh.ply");
     match truth_mesh {
         Err(reason) => {
@@ -76,7 +90,7 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
             }
         }
     }
-    metrics.warnings = sequence.warnings();
+    metrics.warnings.splice(0..0, sequence.warnings());
     let json = metrics.to_json()?;
     let path = out.join("eval.json");
     replace_file(&path, json.as_bytes())?;
@@ -131,27 +145,46 @@ fn evaluate_trajectory(out: &Path, sequence: &dyn Sequence, metrics: &mut Metric
 fn evaluate_renders(
     out: &Path,
     sequence: &mut dyn Sequence,
+    class_truth: ClassTruth,
     screen: Screen,
     metrics: &mut Metrics,
 ) -> Result<()> {
     let info = sequence.info().clone();
+    let unlabelled = recorded_unlabelled_id(out).unwrap_or(unlabelled_id(&class_truth.table));
     let folder = out.join("renders");
     let rendered: Vec<usize> =
         (0..info.frames).filter(|i| folder.join(format!("{i:06}.color.png")).is_file()).collect();
-    let mut scores = ViewScores::new(&info);
+    let mut scores = ViewScores::new(&info, class_truth);
     let mut progress = screen.progress("comparing pictures", rendered.len());
     for (i, &index) in rendered.iter().enumerate() {
-        let view = read_view(&folder, index, &info)?;
-        scores.add(&sequence.frame(index)?, &view)?;
+        let truth = scores.truth();
+        let view = read_view(&folder, index, &info, &truth.table, unlabelled)?;
+        let frame = sequence.frame(index)?;
+        let labels = truth.of_frame(&frame)?;
+        scores.add(&frame, &view, labels.as_deref())?;
         progress.set(i as u64 + 1, String::new);
     }
     progress.finish();
-    scores.report(metrics);
+    scores.report(unlabelled, metrics);
     Ok(())
 }
 
+/// The id without meaning in the run's class pictures, by its metrics.json: the pictures alone do
+/// not tell where the map knew other classes than the true labels.
+fn recorded_unlabelled_id(out: &Path) -> Option<u16> {
+    let text = std::fs::read_to_string(out.join("metrics.json")).ok()?;
+    let json: serde_json::Value = serde_json::from_str(&text).ok()?;
+    json["renders"]["unlabelled_id"].as_u64()?.try_into().ok()
+}
+
 /// The pictures of a frame; without a class picture all pixels are unlabelled.
-fn read_view(folder: &Path, index: usize, info: &SequenceInfo) -> Result<View> {
+fn read_view(
+    folder: &Path,
+    index: usize,
+    info: &SequenceInfo,
+    table: &ClassTable,
+    unlabelled: u16,
+) -> Result<View> {
     let read = |kind: &str, expected: ColorType| -> Result<DynamicImage> {
         let path = folder.join(format!("{index:06}.{kind}.png"));
         let name = path.display();
@@ -176,16 +209,17 @@ fn read_view(folder: &Path, index: usize, info: &SequenceInfo) -> Result<View> {
         .map(|&mm| (f64::from(mm) / 1000.0) as f32)
         .collect();
     let has_classes = folder.join(format!("{index:06}.class.png")).is_file();
-    let class = if has_classes && !info.classes.is_empty() {
-        compact(&read("class", ColorType::L16)?, &info.classes)
+    let class = if has_classes && !table.is_empty() {
+        compact(&read("class", ColorType::L16)?, table, unlabelled)
     } else {
         vec![UNLABELLED; info.camera.pixels()]
     };
     Ok(View { camera: info.camera, color, depth_m, class })
 }
 
-fn compact(image: &DynamicImage, table: &ClassTable) -> Vec<u8> {
-    let index_of_raw = table.index_of_raw();
+fn compact(image: &DynamicImage, table: &ClassTable, unlabelled: u16) -> Vec<u8> {
+    let mut index_of_raw = table.index_of_raw();
+    index_of_raw.insert(unlabelled, UNLABELLED);
     let index = |raw: &u16| index_of_raw.get(raw).copied().unwrap_or(UNLABELLED);
     image.to_luma16().iter().map(index).collect()
 }

@@ -1,6 +1,7 @@
 //! `mte-slam run`.
 use crate::{
     args::RunArgs,
+    class_truth::ClassTruth,
     configuration,
     evaluation::MeshTruth,
     input,
@@ -24,6 +25,11 @@ pub fn run(args: &RunArgs, screen: Screen) -> Result<()> {
     } else {
         configuration::effective(&args.config, default_preset)?
     };
+    let class_truth = if info.classes.is_empty() {
+        ClassTruth::none("there are no labels", info)
+    } else {
+        input::open_truth(&args.dataset, &args.selection, info)?
+    };
     let record = RunRecord {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         preset: effective.preset.clone(),
@@ -34,6 +40,7 @@ pub fn run(args: &RunArgs, screen: Screen) -> Result<()> {
         frames: info.frames,
         scale: args.selection.scale,
         labels: args.selection.labels.clone(),
+        truth_labels: class_truth.name.clone(),
         ..RunRecord::default()
     };
     let default_out =
@@ -46,6 +53,7 @@ pub fn run(args: &RunArgs, screen: Screen) -> Result<()> {
         engine: &args.engine,
         output: &args.output,
         default_out,
+        class_truth,
         truth_mesh,
     };
     pipeline::run(job, screen)

@@ -1,7 +1,13 @@
 //! `metrics.json`: every figure with its unit in the key and its protocol beside it, and the table
 //! that people read at the end of a run.
 use super::timings::Spread;
-use mte_slam_core::metrics::{AteReport, DepthReport, PsnrReport, SemanticReport, SurfaceReport};
+use mte_slam_core::{
+    classes::{Class, ClassTable},
+    metrics::{
+        AteReport, BoundaryReport, DepthReport, PsnrReport, SMALL_SHARE_PERCENT, SemanticReport,
+        SurfaceReport,
+    },
+};
 use serde::Serialize;
 use std::{collections::BTreeMap, fmt::Write};
 
@@ -38,9 +44,12 @@ pub struct Metrics {
     /// Rendered colour against the input.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub color: Option<PsnrReport>,
-    /// Rendered classes against the labels.
+    /// Rendered classes against the true labels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub semantics: Option<SemanticFigures>,
+    /// The labels that the map learnt from against the true labels, where those are others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub input_labels: Option<SemanticFigures>,
     /// Mesh against the true mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<SurfaceReport>,
@@ -75,6 +84,8 @@ pub struct SequenceRecord {
     pub scale: f64,
     /// `none`, `dataset` or a folder.
     pub labels: String,
+    /// Labels that classes are scored against: `none`, `dataset` or a folder.
+    pub truth_labels: String,
     /// Number of classes.
     pub classes: usize,
 }
@@ -105,14 +116,126 @@ pub struct EngineRecord {
     pub driver: String,
 }
 
-/// Rendered classes.
+/// Classes against true labels.
 #[derive(Debug, Clone, Serialize)]
 pub struct SemanticFigures {
+    /// The true labels: `dataset` or a folder.
+    pub truth: String,
     /// The figures.
     #[serde(flatten)]
     pub report: SemanticReport,
+    /// Share of the true pixels below which a class counts as thin or small \[%\].
+    pub small_share_percent: f64,
     /// IoU \[%\] by the class's name, of those with a non-empty union.
     pub iou_percent_by_name: BTreeMap<String, f64>,
+    /// Every class that occurs in the truth or is predicted.
+    pub classes: Vec<ClassFigures>,
+}
+
+/// One class.
+#[derive(Debug, Clone, Serialize)]
+pub struct ClassFigures {
+    /// The id in the label images.
+    pub id: u16,
+    /// Its name.
+    pub name: String,
+    /// True pixels.
+    pub pixels: u64,
+    /// Whether it is a thin or small one.
+    pub small: bool,
+    /// IoU \[%\].
+    pub iou_percent: f64,
+    /// Share of its true pixels that are right \[%\].
+    pub accuracy_percent: Option<f64>,
+    /// Boundary IoU \[%\].
+    pub boundary_iou_percent: Option<f64>,
+    /// F-score of the outline \[%\].
+    pub boundary_f_score_percent: Option<f64>,
+}
+
+impl SemanticFigures {
+    /// The figures of `report`, whose compact classes are those of `table`.
+    pub fn new(truth: &str, report: SemanticReport, table: &ClassTable) -> SemanticFigures {
+        let of_boundary = |c: usize, f: fn(&BoundaryReport) -> &Vec<Option<f64>>| {
+            report.boundary.as_ref().and_then(|b| f(b).get(c).copied().flatten())
+        };
+        let figures = |(c, class): (usize, &Class)| {
+            Some(ClassFigures {
+                id: class.raw_id,
+                name: class.name.clone(),
+                pixels: report.pixels_of_class[c],
+                small: report.small_classes.iter().any(|&s| usize::from(s) == c),
+                iou_percent: report.iou_percent[c]?,
+                accuracy_percent: report.accuracy_percent_of_class[c],
+                boundary_iou_percent: of_boundary(c, |b| &b.iou_percent_of_class),
+                boundary_f_score_percent: of_boundary(c, |b| &b.f_score_percent_of_class),
+            })
+        };
+        let classes: Vec<_> = table.classes.iter().enumerate().filter_map(figures).collect();
+        SemanticFigures {
+            truth: truth.to_owned(),
+            small_share_percent: SMALL_SHARE_PERCENT,
+            iou_percent_by_name: classes.iter().map(|c| (c.name.clone(), c.iou_percent)).collect(),
+            classes,
+            report,
+        }
+    }
+
+    /// Rows of the table, their names after `prefix`.
+    fn rows(&self, prefix: &str) -> Vec<(String, String)> {
+        let r = &self.report;
+        let mut rows = vec![
+            ("mIoU".to_owned(), format!("{:.2} %", r.miou_percent)),
+            ("pixel accuracy".to_owned(), format!("{:.2} %", r.pixel_accuracy_percent)),
+        ];
+        if let Some(small) = r.small_miou_percent {
+            let n = r.small_classes.len();
+            let name = format!("mIoU of {n} classes < {} %", self.small_share_percent);
+            rows.push((name, format!("{small:.2} %")));
+        }
+        if let Some(b) = &r.boundary {
+            let both = format!("{:.2}, {:.2} %", b.iou_percent, b.f_score_percent);
+            rows.push(("boundary IoU, F-score".to_owned(), both));
+        }
+        rows.into_iter().map(|(name, value)| (format!("{prefix}{name}"), value)).collect()
+    }
+
+    /// A line a class, most frequent first; beside the IoU that of the `input` labels.
+    fn class_table(&self, input: Option<&SemanticFigures>) -> String {
+        let mut classes: Vec<&ClassFigures> = self.classes.iter().collect();
+        classes.sort_by_key(|c| std::cmp::Reverse(c.pixels));
+        let width = classes.iter().map(|c| c.name.chars().count()).max().unwrap_or(0).max(5);
+        let figure = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.1}"));
+        let mut text = format!(
+            "{:width$}  {:>5}  {:>8}  {:>6}{}  {:>8}  {:>12}  {:>7}\n",
+            "class",
+            "id",
+            "pixels %",
+            "IoU %",
+            if input.is_some() { "   input" } else { "" },
+            "accuracy",
+            "boundary IoU",
+            "F-score"
+        );
+        for c in classes {
+            let of_input = input.map_or(String::new(), |i| {
+                let same = i.classes.iter().find(|other| other.id == c.id);
+                format!("  {:>6}", figure(same.map(|s| s.iou_percent)))
+            });
+            let share = 100.0 * c.pixels as f64 / self.report.pixels as f64;
+            let _ = writeln!(
+                text,
+                "{:width$}  {:>5}  {share:>8.2}  {:>6.1}{of_input}  {:>8}  {:>12}  {:>7}",
+                c.name,
+                c.id,
+                c.iou_percent,
+                figure(c.accuracy_percent),
+                figure(c.boundary_iou_percent),
+                figure(c.boundary_f_score_percent)
+            );
+        }
+        text
+    }
 }
 
 /// What was rendered.
@@ -182,8 +305,21 @@ impl Metrics {
             row("PSNR, views", format!("{:.2} dB", c.mean_of_psnr_db), &c.protocol);
         }
         if let Some(s) = &self.semantics {
-            row("mIoU", format!("{:.2} %", s.report.miou_percent), &s.report.protocol);
-            row("pixel accuracy", format!("{:.2} %", s.report.pixel_accuracy_percent), "");
+            let boundary = s.report.boundary.as_ref();
+            for (i, (name, value)) in s.rows("").into_iter().enumerate() {
+                let protocol = match i {
+                    0 => s.report.protocol.as_str(),
+                    _ if name.starts_with("boundary") => boundary.map_or("", |b| &b.protocol),
+                    _ => "",
+                };
+                row(&name, value, protocol);
+            }
+        }
+        if let Some(s) = &self.input_labels {
+            for (i, (name, value)) in s.rows("input labels: ").into_iter().enumerate() {
+                let protocol = "the labels that the map learnt from, in the rendered frames";
+                row(&name, value, if i == 0 { protocol } else { "" });
+            }
         }
         if let Some(m) = &self.mesh {
             let s = &m.point_to_surface;
@@ -224,6 +360,11 @@ impl Metrics {
         }
         for (i, protocol) in protocols.iter().enumerate() {
             let _ = writeln!(text, "{}", wrapped(&format!("[{}] {protocol}", i + 1)));
+        }
+        if let Some(s) = &self.semantics {
+            text += "\n";
+            text += &s.class_table(self.input_labels.as_ref());
+            text += "\n";
         }
         for warning in &self.warnings {
             let _ = writeln!(text, "note: {warning}");

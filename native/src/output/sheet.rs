@@ -22,15 +22,32 @@ const COLOR_ERROR: f64 = 64.0;
 /// Depth error at the top of its scale \[m\].
 const DEPTH_ERROR_M: f64 = 0.10;
 
-/// A sheet as PNG. `title` names sequence and frame; classes are shown when the frame has labels
-/// and the table is not empty, or the map's alone when only they exist.
-pub fn sheet(
-    title: &str,
-    frame: &Frame,
-    depth_unit_m: f64,
-    view: &View,
-    table: &ClassTable,
-) -> Result<Vec<u8>> {
+/// Wrong pixels, and those that were right in the input.
+const WRONG: [u8; 3] = [235, 50, 60];
+/// Right pixels that were wrong in the input.
+const MENDED: [u8; 3] = [60, 200, 90];
+
+/// What a sheet shows.
+pub struct Sheet<'a> {
+    /// Sequence and frame.
+    pub title: &'a str,
+    /// What the camera saw, with the labels that the map learnt from.
+    pub frame: &'a Frame,
+    /// Metres per unit of the frame's depth.
+    pub depth_unit_m: f64,
+    /// What the map renders.
+    pub view: &'a View,
+    /// Classes of frame, view and true labels; classes are not shown when it is empty.
+    pub table: &'a ClassTable,
+    /// What the classes are scored against.
+    pub true_labels: Option<&'a [u8]>,
+    /// Whether those are not the frame's own: then a row compares the input with them too.
+    pub own_truth: bool,
+}
+
+/// A sheet as PNG.
+pub fn sheet(sheet: &Sheet) -> Result<Vec<u8>> {
+    let Sheet { title, frame, depth_unit_m, view, table, true_labels, own_truth } = *sheet;
     let (w, h) = (view.camera.width as usize, view.camera.height as usize);
     // Panels wide enough for their captions.
     let zoom = 320usize.div_ceil(w).max(1);
@@ -39,8 +56,13 @@ pub fn sheet(
     let bar = 20 * text;
     let with_classes = !table.is_empty();
     let (pw, ph) = (w * zoom, h * zoom);
-    let rows = if with_classes { 3 } else { 2 };
-    let legend = if with_classes { legend_entries(frame, view) } else { Vec::new() };
+    let compared = true_labels.filter(|_| own_truth && with_classes);
+    let rows = 2 + usize::from(with_classes) + usize::from(compared.is_some());
+    let legend = if with_classes {
+        legend_entries([frame.labels.as_deref(), Some(&view.class), compared])
+    } else {
+        Vec::new()
+    };
     let columns = (3 * pw + 2 * GAP) / (180 * text);
     let legend_height = legend.len().div_ceil(columns.max(1)) * band + GAP;
     let width = 3 * pw + 4 * GAP;
@@ -98,28 +120,38 @@ pub fn sheet(
         let colors = |c: &[u8]| c.iter().map(|&c| class_color(c, table)).collect::<Vec<_>>();
         if let Some(labels) = &frame.labels {
             panel(2, 0, "input classes", &colors(labels));
-            let known = labels.iter().filter(|&&l| l != UNLABELLED).count().max(1);
-            let mut right = 0;
-            let image: Vec<_> = labels
-                .iter()
-                .zip(&view.class)
-                .zip(&frame.color)
-                .map(|((&l, &c), rgb)| {
-                    let grey = (rgb.iter().map(|&v| u32::from(v)).sum::<u32>() / 6) as u8;
-                    if l == UNLABELLED {
-                        [0; 3]
-                    } else if l == c {
-                        right += 1;
-                        [grey; 3]
-                    } else {
-                        [235, 50, 60]
-                    }
-                })
-                .collect();
-            let percent = 100.0 * f64::from(right) / known as f64;
-            panel(2, 2, &format!("wrong pixels (red)  {percent:.1} % right"), &image);
         }
         panel(2, 1, "rendered classes", &colors(&view.class));
+        // On the input's brightness; black without a true class.
+        let marked = |truth: &[u8], mark: &dyn Fn(usize) -> Option<[u8; 3]>| -> Vec<[u8; 3]> {
+            let grey = |c: &[u8; 3]| (c.iter().map(|&v| u32::from(v)).sum::<u32>() / 6) as u8;
+            (0..truth.len())
+                .map(|i| match truth[i] {
+                    UNLABELLED => [0; 3],
+                    _ => mark(i).unwrap_or([grey(&frame.color[i]); 3]),
+                })
+                .collect()
+        };
+        if let Some(truth) = true_labels {
+            let image = marked(truth, &|i| (view.class[i] != truth[i]).then_some(WRONG));
+            let percent = percent_right(truth, &view.class);
+            panel(2, 2, &format!("rendered: wrong (red)  {percent:.1} % right"), &image);
+        }
+        if let Some(truth) = compared {
+            panel(3, 0, "true classes", &colors(truth));
+            if let Some(input) = &frame.labels {
+                let image = marked(truth, &|i| (input[i] != truth[i]).then_some(WRONG));
+                let percent = percent_right(truth, input);
+                panel(3, 1, &format!("input: wrong (red)  {percent:.1} % right"), &image);
+                let image =
+                    marked(truth, &|i| match (input[i] == truth[i], view.class[i] == truth[i]) {
+                        (true, false) => Some(WRONG),
+                        (false, true) => Some(MENDED),
+                        _ => None,
+                    });
+                panel(3, 2, "input -> rendered: mended (green), spoilt (red)", &image);
+            }
+        }
     }
 
     scale_bar(&mut canvas, x(2), y(1) - bar + 3, pw, text, "0", &format!("{COLOR_ERROR}/255"));
@@ -139,10 +171,16 @@ pub fn sheet(
     canvas.png()
 }
 
-/// Classes of the frame or the view, in the table's order.
-fn legend_entries(frame: &Frame, view: &View) -> Vec<u8> {
-    let labels = frame.labels.as_deref().unwrap_or_default();
-    let seen: BTreeSet<u8> = labels.iter().chain(&view.class).copied().collect();
+/// Share of the labelled pixels with the right class \[%\].
+fn percent_right(truth: &[u8], classes: &[u8]) -> f64 {
+    let labelled = || truth.iter().zip(classes).filter(|(t, _)| **t != UNLABELLED);
+    let right = labelled().filter(|(t, c)| t == c).count();
+    100.0 * right as f64 / labelled().count().max(1) as f64
+}
+
+/// Classes of any of the images, in the table's order.
+fn legend_entries(images: [Option<&[u8]>; 3]) -> Vec<u8> {
+    let seen: BTreeSet<u8> = images.into_iter().flatten().flatten().copied().collect();
     seen.into_iter().filter(|&c| c != UNLABELLED).collect()
 }
 
