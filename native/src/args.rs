@@ -239,6 +239,23 @@ pub struct SelectionArgs {
     /// of --labels].
     #[arg(long, value_name = "dataset|DIR|none", help_heading = "Recording")]
     pub truth_labels: Option<String>,
+    /// What the labels and the truth are read with.
+    #[command(flatten)]
+    pub classes: ClassArgs,
+}
+
+/// What the ids in label images mean.
+#[derive(Clone, Debug, Default, Args)]
+pub struct ClassArgs {
+    /// Ids, names and colours of the classes: `nyu40` (ScanNet), `replica` (its 101 classes) or a
+    /// file like classes.json, `{"7": {"name": "bed", "color": [86, 117, 191]}}` [default: the
+    /// classes.json of the label folder or the recording, else every id that occurs].
+    #[arg(long, value_name = "nyu40|replica|FILE", help_heading = "Recording")]
+    pub classes: Option<String>,
+    /// Id in the label images that means "no label" [default: that of the class named void,
+    /// unlabelled or unlabeled; 0 for nyu40 and replica; else 255].
+    #[arg(long, value_name = "ID", help_heading = "Recording")]
+    pub unlabelled: Option<u16>,
 }
 
 /// `demo`.
@@ -289,6 +306,9 @@ pub struct EvalArgs {
     /// Labels that the run was given, to be scored too [default: as its config.toml says].
     #[arg(long, value_name = "none|dataset|DIR")]
     pub labels: Option<String>,
+    /// What the ids mean [default: as config.toml says].
+    #[command(flatten)]
+    pub classes: ClassArgs,
 }
 
 /// Which parts of a mesh count as observed; both meshes are culled alike.

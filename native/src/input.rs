@@ -6,7 +6,7 @@ use crate::{
 use anyhow::{Result, anyhow};
 use mte_slam_core::{
     classes::UNLABELLED,
-    dataset::{self, LabelSource, Layout, OpenOptions},
+    dataset::{self, ClassList, LabelSource, Layout, OpenOptions},
     frame::SequenceInfo,
     mesh::Mesh,
     sequence::Sequence,
@@ -46,6 +46,8 @@ fn open_source(
         frames: selection.frames,
         scale: selection.scale,
         labels,
+        classes: selection.classes.classes.as_deref().map(class_list).transpose()?,
+        unlabelled_raw_id: selection.classes.unlabelled,
         ..OpenOptions::default()
     };
     dataset::open(Box::new(source), options).map_err(|e| {
@@ -53,6 +55,19 @@ fn open_source(
         // Errors about one file name it below the folder only.
         if message.contains(&name) { anyhow!(message) } else { anyhow!("{name}: {message}") }
     })
+}
+
+/// A built-in list of classes, or one from a file.
+fn class_list(name: &str) -> Result<ClassList> {
+    if let Some(list) = ClassList::built_in(name) {
+        return Ok(list);
+    }
+    let built_in = ClassList::BUILT_IN.join(", ");
+    let text = match std::fs::read_to_string(name) {
+        Ok(text) => text,
+        Err(e) => usage!("--classes {name}: {e}; expected one of {built_in}, or a readable file"),
+    };
+    Ok(ClassList::parse(name, &text)?)
 }
 
 /// The labels that classes are scored against, for the recording that `open` opened as `input`.

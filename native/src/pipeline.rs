@@ -20,7 +20,7 @@ use crate::{
 use anyhow::{Context, Result};
 use glam::DVec3;
 use mte_slam_core::{
-    classes::ClassTable,
+    classes::{ClassTable, UNLABELLED},
     frame::SequenceInfo,
     mesh::Mesh,
     pose::Pose,
@@ -81,7 +81,9 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
         .context("the map cannot be set up")?;
     slam.set_clock(clock_s);
 
-    let timings = process(&mut slam, sequence.as_mut(), &record.dataset, screen)?;
+    let (timings, labelled) = process(&mut slam, sequence.as_mut(), &record.dataset, screen)?;
+    // Without a single label the map's classes mean nothing: none are shown.
+    let classes = if labelled { info.classes.clone() } else { ClassTable::default() };
     let estimates = slam.trajectory();
     let truth: Vec<_> = estimates.iter().map(|e| sequence.truth(e.frame)).collect();
 
@@ -96,10 +98,16 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
         estimates.iter().filter(|e| e.status == TrackingStatus::Lost).map(|e| e.frame).collect();
 
     write_trajectory(&folder, sequence.as_ref(), &estimates, &truth, &mut metrics)?;
-    let mut scores = ViewScores::new(&info, job.class_truth);
+    let class_truth = if labelled || info.classes.is_empty() {
+        job.class_truth
+    } else {
+        ClassTruth::none("no pixel of any label image has a class", &info)
+    };
+    let mut scores = ViewScores::new(&info, class_truth);
     if output.render_every > 0 {
         let chosen: Vec<_> = estimates.iter().step_by(output.render_every).copied().collect();
-        render_views(&mut slam, sequence.as_mut(), &folder, &chosen, &mut scores, screen)?;
+        let sequence = sequence.as_mut();
+        render_views(&mut slam, sequence, &folder, &chosen, &classes, &mut scores, screen)?;
     }
     scores.report(pictures::unlabelled_id(&info.classes), &mut metrics);
     if output.no_mesh {
@@ -107,7 +115,7 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
     } else {
         let resolution = output.mesh_resolution.unwrap_or(effective.config.mesh.resolution_m);
         let mesh = extract_mesh(&mut slam, resolution, screen)?;
-        meshes::write(&mesh, &info.classes, &mut |name, bytes| folder.write(name, bytes))?;
+        meshes::write(&mesh, &classes, &mut |name, bytes| folder.write(name, bytes))?;
         match job.truth_mesh {
             Ok(true_mesh) => {
                 screen.note("comparing the mesh with the true one");
@@ -159,18 +167,21 @@ pub fn restore(out: &Path, engine: &EngineArgs, screen: Screen) -> Result<Slam> 
     Ok(slam)
 }
 
-/// Feed every frame; what each cost.
+/// Feed every frame; what each cost, and whether any pixel of any had a class.
 fn process(
     slam: &mut Slam,
     sequence: &mut dyn Sequence,
     recording: &str,
     screen: Screen,
-) -> Result<Vec<Timing>> {
+) -> Result<(Vec<Timing>, bool)> {
     let frames = sequence.info().frames;
+    let mut labelled = false;
     let mut progress = screen.progress("tracking and mapping", frames);
     let mut timings = Vec::with_capacity(frames);
     for index in 0..frames {
         let frame = sequence.frame(index).with_context(|| recording.to_owned())?;
+        let labels = frame.labels.as_deref().unwrap_or_default();
+        labelled = labelled || labels.iter().any(|l| *l != UNLABELLED);
         let begin = Instant::now();
         let report = block_on(slam.process(&frame))
             .with_context(|| format!("frame {} (index {index})", frame.number))?;
@@ -190,7 +201,7 @@ fn process(
     }
     block_on(slam.finish()).context("the last optimisation failed")?;
     progress.finish();
-    Ok(timings)
+    Ok((timings, labelled))
 }
 
 fn live_message(slam: &Slam, sequence: &dyn Sequence, report: &FrameReport) -> String {
@@ -282,6 +293,7 @@ fn render_views(
     sequence: &mut dyn Sequence,
     folder: &OutputFolder,
     chosen: &[PoseEstimate],
+    classes: &ClassTable,
     scores: &mut ViewScores,
     screen: Screen,
 ) -> Result<()> {
@@ -292,7 +304,7 @@ fn render_views(
         let mut view = block_on(slam.render(&estimate.world_from_camera, &info.camera))
             .with_context(|| format!("rendering frame {}", estimate.frame))?;
         let stem = format!("renders/{:06}", estimate.frame);
-        write_view(&view, &info.classes, &mut |kind, bytes| {
+        write_view(&view, classes, &mut |kind, bytes| {
             folder.write(&format!("{stem}.{kind}.png"), bytes)
         })?;
         let truth = scores.truth();
@@ -300,6 +312,7 @@ fn render_views(
         view.class = truth.of_map(&view.class);
         scores.add(&frame, &view, labels.as_deref())?;
         let truth = scores.truth();
+        let no_classes = ClassTable::default();
         frame.labels = frame.labels.map(|l| truth.of_map(&l));
         let title = format!(
             "{}  frame {}  rendered at the estimated pose, without depth input",
@@ -310,7 +323,7 @@ fn render_views(
             frame: &frame,
             depth_unit_m: info.depth_unit_m,
             view: &view,
-            table: &truth.table,
+            table: if classes.is_empty() { &no_classes } else { &truth.table },
             true_labels: labels.as_deref(),
             own_truth: truth.is_own(),
         })?;

@@ -31,6 +31,12 @@ pub struct RunRecord {
     pub labels: String,
     /// Labels that classes were scored against: `none`, `dataset` or a folder.
     pub truth_labels: String,
+    /// The class list asked for, if any: `nyu40`, `replica` or a file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub classes: Option<String>,
+    /// The id asked to mean "no label", if any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unlabelled: Option<u16>,
     /// `gpu` or `cpu`.
     pub engine: String,
     /// Adapter, or processor architecture.
@@ -55,6 +61,8 @@ impl Default for RunRecord {
             scale: 1.0,
             labels: "dataset".to_owned(),
             truth_labels: "dataset".to_owned(),
+            classes: None,
+            unlabelled: None,
             engine: String::new(),
             adapter: String::new(),
             backend: String::new(),

@@ -330,6 +330,34 @@ fn labels_may_be_scored_against_others() {
 }
 
 #[test]
+fn labels_without_any_class_leave_geometry_and_colour() {
+    let folder = recording();
+    let f = folder.path();
+    write_labels(f, "blank", |_, _, _| 9999);
+    let blank = ["--json", "--labels", "blank", "--unlabelled", "9999"];
+    let json = json_of(f, &run_arguments(&blank));
+    let reason = json["absent"]["semantics"].as_str().unwrap();
+    assert!(reason.contains("no pixel of any label image has a class"), "{reason}");
+    let warnings = json["warnings"].to_string();
+    assert!(warnings.contains("6 label images has a class: geometry and colour"), "{warnings}");
+    assert!(json["depth"]["l1_cm"].as_f64().unwrap().is_finite());
+    assert!(f.join("out/mesh.ply").is_file() && !f.join("out/mesh_semantic.ply").exists());
+    assert!(!f.join("out/renders/000000.class.png").exists());
+    fs::remove_dir_all(f.join("out")).unwrap();
+
+    // The same ids without saying that they mean nothing: the class list is another's.
+    let none = ["none of the ids in the label images (9999)", "classes.json"];
+    fail(f, &run_arguments(&["--labels", "blank"]), 1, &none);
+    let none = ["none of the ids in the label images (9999)", "nyu40"];
+    fail(f, &run_arguments(&["--labels", "blank", "--classes", "nyu40"]), 1, &none);
+    let no_list = ["--classes nyu41", "nyu40, replica, or a readable file"];
+    fail(f, &run_arguments(&["--classes", "nyu41"]), 2, &no_list);
+    fs::write(f.join("list.json"), "{\"1\": {\"name\": 7}}").unwrap();
+    let bad = ["list.json", "class 1: name"];
+    fail(f, &run_arguments(&["--classes", "list.json"]), 1, &bad);
+}
+
+#[test]
 fn wrong_command_lines_are_usage_errors() {
     let folder = tempfile::tempdir().unwrap();
     let f = folder.path();

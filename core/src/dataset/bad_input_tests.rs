@@ -179,13 +179,13 @@ fn png_of(w: u32, h: u32, value: u16) -> Vec<u8> {
 
 #[test]
 fn sizes_that_change_are_named() {
-    for (file, what) in [
-        ("results/frame000002.png", "colour image size"),
-        ("results/depth000002.png", "depth image size"),
-        ("semantic_class/semantic_class_000002.png", "label image size"),
+    for (file, what, w) in [
+        ("results/frame000002.png", "colour image size", 12),
+        ("results/depth000002.png", "depth image size", 12),
+        ("semantic_class/semantic_class_000002.png", "label image size", 8),
     ] {
-        let e = after(|m| m.insert(file, png_of(12, 8, 0)));
-        assert_has(&e, &[file, "frame 2", what, "12x8", "24x16"]);
+        let e = after(|m| m.insert(file, png_of(w, 8, 0)));
+        assert_has(&e, &[file, "frame 2", what, &format!("{w}x8"), "24x16"]);
     }
     let e = after(|m| m.insert("results/frame000000.png", png_of(16, 24, 0)));
     assert_has(&e, &["frame000000.png", "16x24", "proportions"]);
@@ -262,7 +262,11 @@ fn labels_from_elsewhere_and_without_a_list() {
     assert_eq!(s.frame(0).unwrap().labels, None);
     assert_eq!(s.frame(1).unwrap().labels.unwrap()[0], 1);
     assert_eq!(s.frame(2).unwrap().labels.unwrap()[0], UNLABELLED);
-    assert_has(&s.warnings().join(";"), &["384 label pixels", "not in the class list: 9"]);
+    for _ in 0..2 {
+        let text = s.warnings().join(";");
+        assert_has(&text, &["384 label pixels", "not in the class list: 9 (384)"]);
+        s.frame(2).unwrap(); // counted once
+    }
 
     let mut listless = replica(3);
     listless.remove("classes.json");
@@ -282,6 +286,80 @@ fn labels_from_elsewhere_and_without_a_list() {
     let options = OpenOptions { labels: LabelSource::None, ..Default::default() };
     let mut s = open(Box::new(replica(1)), options).unwrap();
     assert!(s.info().classes.is_empty() && s.frame(0).unwrap().labels.is_none());
+}
+
+fn label_file(frame: usize) -> String {
+    format!("semantic_class/semantic_class_{frame:06}.png")
+}
+
+#[test]
+fn labels_of_another_size_are_fitted_by_nearest_pixel() {
+    let mut m = replica(3);
+    // Twice as large: pixel (2i, 2j) counts, as with depth. Left half bed, right half cup.
+    let mut bytes = Vec::new();
+    let big = image::ImageBuffer::<image::Luma<u16>, Vec<u16>>::from_fn(W * 2, H * 2, |x, _| {
+        image::Luma([if x < W { 7 } else { 300 }])
+    });
+    big.write_to(&mut std::io::Cursor::new(&mut bytes), image::ImageFormat::Png).unwrap();
+    m.insert(label_file(1), bytes);
+    m.insert(label_file(2), png_of(W / 2, H / 2, 300));
+    let mut s = opened(&m).unwrap();
+    let labels = s.frame(1).unwrap().labels.unwrap();
+    for (i, label) in labels.iter().enumerate() {
+        assert_eq!(*label, if i % (W as usize) < W as usize / 2 { 1 } else { 2 }, "{i}");
+    }
+    assert_eq!(s.labels(2).unwrap().unwrap(), vec![2; (W * H) as usize]);
+    let said = s.warnings();
+    assert_has(&said.join(";"), &["2 label images of another size (12x8)", "24x16", "nearest"]);
+    assert_eq!(said.len(), 1, "{said:?}");
+}
+
+#[test]
+fn ids_and_lists_that_do_not_match() {
+    // 65535 among others: unlabelled, and said.
+    let mut m = replica(3);
+    m.insert(label_file(1), png_of(W, H, 65535));
+    let mut s = opened(&m).unwrap();
+    assert_eq!(s.frame(1).unwrap().labels.unwrap(), vec![UNLABELLED; (W * H) as usize]);
+    assert_has(&s.warnings().join(";"), &["384 label pixels", "65535 (384)"]);
+    // It may be the unlabelled id, or a class.
+    let options = OpenOptions { unlabelled_raw_id: Some(65535), ..Default::default() };
+    let mut s = open(Box::new(m.clone()), options).unwrap();
+    s.frame(1).unwrap();
+    assert!(!s.warnings().join(";").contains("65535"), "{:?}", s.warnings());
+    m.insert("classes.json", r#"{"65535": {"name": "sky"}, "7": {"name": "bed"}}"#);
+    let mut s = opened(&m).unwrap();
+    assert_eq!(s.frame(1).unwrap().labels.unwrap(), vec![1; (W * H) as usize]);
+
+    // The list of another data set, from a file or built in.
+    m.insert("classes.json", r#"{"400": {"name": "sky"}, "401": {"name": "sea"}}"#);
+    let e = error_of(&m, OpenOptions::default());
+    assert_has(&e, &["classes.json", "classes", "none of the ids", "0, 1, 7, 300", "65535"]);
+    let mut far = replica(3);
+    (0..3).for_each(|i| far.insert(label_file(i), png_of(W, H, 500)));
+    let options = OpenOptions { classes: ClassList::built_in("nyu40"), ..Default::default() };
+    assert_has(&error_of(&far, options), &["nyu40", "none of the ids", "500"]);
+    // One that fits replaces the recording's own.
+    let options = OpenOptions { classes: ClassList::built_in("nyu40"), ..Default::default() };
+    let s = open(Box::new(replica(3)), options).unwrap();
+    assert_eq!(s.info().classes.classes[6].name, "table");
+}
+
+#[test]
+fn sequences_without_any_label_are_read_with_a_warning() {
+    let mut m = replica(3);
+    (0..3).for_each(|i| m.insert(label_file(i), png_of(W, H, 255)));
+    for listed in [true, false] {
+        if !listed {
+            m.remove("classes.json");
+        }
+        let options = OpenOptions { unlabelled_raw_id: Some(255), ..Default::default() };
+        let mut s = open(Box::new(m.clone()), options).unwrap();
+        assert_eq!(s.info().classes.is_empty(), !listed);
+        let labels = s.frame(1).unwrap().labels.unwrap();
+        assert!(labels.iter().all(|l| *l == UNLABELLED));
+        assert_has(&s.warnings().join(";"), &["no pixel of 1 label image has a class"]);
+    }
 }
 
 #[test]

@@ -95,20 +95,17 @@ pub(super) fn depth(
 
 /// Labels: the numbers of a grey or palette PNG of up to 16 bits. Palette entries are read as
 /// indices; their colours mean nothing here.
-pub(super) fn labels(
-    bytes: &[u8],
-    origin: Origin<'_>,
-    expected: Option<Size>,
-) -> Result<Vec<u16>, SequenceError> {
+pub(super) fn labels(bytes: &[u8], origin: Origin<'_>) -> Result<(Vec<u16>, Size), SequenceError> {
     let wanted = "a grey or palette PNG that holds class ids";
-    let raw = RawPng::read(bytes, origin, expected, wanted, |color, _| {
+    let raw = RawPng::read(bytes, origin, None, wanted, |color, _| {
         matches!(color, ColorType::Grayscale | ColorType::Indexed)
     })?;
-    Ok(match raw.bits {
+    let ids = match raw.bits {
         16 => raw.words(),
         8 => raw.data.iter().map(|&b| u16::from(b)).collect(),
         bits => raw.packed(bits),
-    })
+    };
+    Ok((ids, raw.size))
 }
 
 /// The size of a PNG or JPEG, from its header.
@@ -280,10 +277,10 @@ mod tests {
             (ColorType::Grayscale, BitDepth::Sixteen, &[1, 0, 0, 5, 255, 255], [256, 5, 65535]),
         ] {
             let png = png_of(color, bits, 3, 1, data);
-            assert_eq!(labels(&png, ORIGIN, None).unwrap(), want, "{color:?} {bits:?}");
+            assert_eq!(labels(&png, ORIGIN).unwrap().0, want, "{color:?} {bits:?}");
         }
         let rgb = png_of(ColorType::Rgb, BitDepth::Eight, 1, 1, &[0; 3]);
-        assert!(labels(&rgb, ORIGIN, None).unwrap_err().to_string().contains("8-bit RGB"));
+        assert!(labels(&rgb, ORIGIN).unwrap_err().to_string().contains("8-bit RGB"));
     }
 
     #[test]

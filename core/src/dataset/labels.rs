@@ -1,20 +1,24 @@
 //! Label images: which file belongs to which frame, which classes there are, raw ids to indices.
 use super::{
+    class_list::{ClassList, DEFAULT_UNLABELLED},
     decode::{self, Origin, Size},
     entries::Entry,
-    folder::{Folder, invalid, number_between, plural, shortened},
+    folder::{Folder, invalid, number_between, plural},
+    resize::Resize,
 };
 use crate::{
-    classes::{Class, ClassTable, UNLABELLED},
+    classes::{ClassTable, UNLABELLED},
     sequence::SequenceError,
 };
 use std::collections::{BTreeMap, BTreeSet};
 
 const CLASSES_FILE: &str = "classes.json";
-/// The raw id without meaning when the class list names none.
-const DEFAULT_VOID: u16 = 255;
 /// In the look-up table: an id that is not in the class list.
 const UNKNOWN: u16 = 256;
+/// So many label images decide at opening whether the class list is theirs.
+const CHECKED_IMAGES: usize = 8;
+/// Width over height of a label image may differ from the depth image's by this share.
+pub(super) const ASPECT_TOLERANCE: f64 = 0.03;
 
 /// The label images of a recording.
 pub(super) struct Labels {
@@ -23,13 +27,27 @@ pub(super) struct Labels {
     pub table: ClassTable,
     /// Raw id -> compact index, [`UNLABELLED`] or [`UNKNOWN`].
     index: Vec<u16>,
-    /// Pixels met with ids that are not in the class list, by id.
+    met: Met,
+}
+
+/// What reading met, each frame counted once.
+#[derive(Default)]
+struct Met {
+    frames: BTreeSet<u64>,
+    /// Pixels with ids that are not in the class list, by id.
     unknown: BTreeMap<u16, u64>,
+    /// Pixels with a class.
+    labelled: u64,
+    /// Images of another size, and the size of the last one.
+    resized: usize,
+    size: Size,
+    expected: Size,
 }
 
 /// What the caller wants of the class list.
 pub(super) struct Wanted {
-    pub void: Option<u16>,
+    pub list: Option<ClassList>,
+    pub unlabelled: Option<u16>,
     pub only_present: bool,
 }
 
@@ -60,41 +78,55 @@ impl Labels {
                 }
             }
         }
-        let listed = match &own {
-            Some(folder) if folder.has(CLASSES_FILE) => Some(folder),
-            _ => recording.has(CLASSES_FILE).then_some(recording),
-        };
-        let (mut classes, void) = match listed {
-            Some(folder) => class_list(folder, wanted.void)?,
-            None => (Vec::new(), wanted.void.or(Some(DEFAULT_VOID))),
-        };
-        if listed.is_none() || wanted.only_present {
-            let present = scan(own.as_ref().unwrap_or(recording), frames, size)?;
-            if listed.is_some() {
-                classes.retain(|c| present.contains(&c.raw_id));
-            } else {
-                let named = present.iter().filter(|id| Some(**id) != void);
-                classes = named.map(|&id| unnamed_class(id)).collect();
+        let images = own.as_ref().unwrap_or(recording);
+        let listed = match (wanted.list, &own) {
+            (Some(list), _) => Some(list),
+            (None, Some(folder)) if folder.has(CLASSES_FILE) => {
+                Some(ClassList::parse(CLASSES_FILE, &folder.text(CLASSES_FILE)?)?)
             }
-        }
+            (None, _) if recording.has(CLASSES_FILE) => {
+                Some(ClassList::parse(CLASSES_FILE, &recording.text(CLASSES_FILE)?)?)
+            }
+            (None, _) => None,
+        };
+        let mut list = match listed {
+            Some(mut list) => {
+                if let Some(id) = wanted.unlabelled {
+                    list.set_unlabelled(id);
+                }
+                if wanted.only_present {
+                    let present = scan(images, frames, size)?;
+                    list.table.classes.retain(|c| present.contains(&c.raw_id));
+                } else {
+                    check_list(&list, images, frames, size)?;
+                }
+                list
+            }
+            None => {
+                let mut list = ClassList::unnamed(scan(images, frames, size)?);
+                list.set_unlabelled(wanted.unlabelled.unwrap_or(DEFAULT_UNLABELLED));
+                list
+            }
+        };
+        let unlabelled = list.unlabelled_ids();
+        let classes = std::mem::take(&mut list.table.classes);
         if classes.len() > usize::from(UNLABELLED) {
-            let file = if listed.is_some() { CLASSES_FILE } else { "the label images" };
             let found = classes.len().to_string();
             let expected = format!("at most {UNLABELLED}, the void class not counted");
-            return Err(invalid(file, None, "number of classes", found, expected));
+            return Err(invalid(&list.name, None, "number of classes", found, expected));
         }
         let mut index = vec![UNKNOWN; 1 << 16];
         for (i, class) in classes.iter().enumerate() {
             index[usize::from(class.raw_id)] = i as u16;
         }
-        if let Some(void) = void {
-            index[usize::from(void)] = UNLABELLED.into();
+        for id in unlabelled {
+            index[usize::from(id)] = UNLABELLED.into();
         }
-        let table = ClassTable { classes };
-        Ok(Some(Labels { own, table, index, unknown: BTreeMap::new() }))
+        let met = Met { expected: size, ..Met::default() };
+        Ok(Some(Labels { own, table: ClassTable { classes }, index, met }))
     }
 
-    /// The compact indices of one frame, in the label image's own size.
+    /// The compact indices of one frame, in the size of its depth image.
     pub fn read(
         &mut self,
         recording: &Folder,
@@ -102,35 +134,117 @@ impl Labels {
         frame: u64,
         size: Size,
     ) -> Result<Vec<u8>, SequenceError> {
-        let raw = decode(self.own.as_ref().unwrap_or(recording), file, frame, size)?;
+        let folder = self.own.as_ref().unwrap_or(recording);
+        let (raw, stored) = decode(folder, file, frame, size)?;
+        let first = self.met.frames.insert(frame);
+        if first && stored != size {
+            self.met.resized += 1;
+            self.met.size = stored;
+        }
         let mut out = Vec::with_capacity(raw.len());
         for id in raw {
             out.push(match self.index[usize::from(id)] {
                 UNKNOWN => {
-                    *self.unknown.entry(id).or_default() += 1;
+                    if first {
+                        *self.met.unknown.entry(id).or_default() += 1;
+                    }
                     UNLABELLED
                 }
                 index => index as u8,
             });
         }
+        if first {
+            self.met.labelled += out.iter().filter(|c| **c != UNLABELLED).count() as u64;
+        }
         Ok(out)
     }
 
-    /// One sentence about unknown ids, if there were any.
-    pub fn warning(&self) -> Option<String> {
-        let pixels: u64 = self.unknown.values().sum();
-        let ids: Vec<String> = self.unknown.keys().take(8).map(u16::to_string).collect();
-        let more = if self.unknown.len() > 8 { ", ..." } else { "" };
-        (pixels > 0).then(|| {
-            let ids = ids.join(", ");
-            format!("{pixels} label pixels taken as unlabelled: not in the class list: {ids}{more}")
-        })
+    /// What was met, one sentence each.
+    pub fn warnings(&self) -> Vec<String> {
+        let met = &self.met;
+        let mut all = Vec::new();
+        let pixels: u64 = met.unknown.values().sum();
+        if pixels > 0 {
+            // The most frequent first: a wrong list shows by them.
+            let mut ids: Vec<_> = met.unknown.iter().collect();
+            ids.sort_by_key(|(id, n)| (std::cmp::Reverse(**n), **id));
+            let more = if ids.len() > 8 { ", ..." } else { "" };
+            let ids: Vec<String> =
+                ids.iter().take(8).map(|(id, n)| format!("{id} ({n})")).collect();
+            all.push(format!(
+                "{pixels} label pixels taken as unlabelled: not in the class list: {}{more}",
+                ids.join(", ")
+            ));
+        }
+        if met.resized > 0 {
+            let ((w, h), (to_w, to_h)) = (met.size, met.expected);
+            let images = plural(met.resized, "label image");
+            all.push(format!(
+                "{images} of another size ({w}x{h}) fitted to {to_w}x{to_h} by nearest pixel"
+            ));
+        }
+        if !met.frames.is_empty() && met.labelled == 0 {
+            let images = plural(met.frames.len(), "label image");
+            all.push(format!("no pixel of {images} has a class: geometry and colour only"));
+        }
+        all
     }
 }
 
-fn decode(folder: &Folder, file: &str, frame: u64, size: Size) -> Result<Vec<u16>, SequenceError> {
+/// The ids of a label image in `size`, and its own size.
+fn decode(
+    folder: &Folder,
+    file: &str,
+    frame: u64,
+    size: Size,
+) -> Result<(Vec<u16>, Size), SequenceError> {
     let origin = Origin { file, frame, what: "label image" };
-    decode::labels(&folder.read(file)?, origin, Some(size))
+    let (ids, stored) = decode::labels(&folder.read(file)?, origin)?;
+    if stored == size {
+        return Ok((ids, stored));
+    }
+    let aspect = |s: Size| f64::from(s.0) / f64::from(s.1);
+    if (aspect(stored) / aspect(size) - 1.0).abs() > ASPECT_TOLERANCE {
+        return Err(invalid(
+            file,
+            Some(frame),
+            "label image size",
+            format!("{}x{}", stored.0, stored.1),
+            format!("{}x{} as the depth image, or its proportions", size.0, size.1),
+        ));
+    }
+    Ok((Resize::to_size(stored, size).nearest(&ids), stored))
+}
+
+/// Refuses a list that knows none of the ids in some of the images: it is another data set's.
+fn check_list(
+    list: &ClassList,
+    folder: &Folder,
+    frames: &[Entry],
+    size: Size,
+) -> Result<(), SequenceError> {
+    let labelled: Vec<&Entry> = frames.iter().filter(|f| f.label.is_some()).collect();
+    let known: BTreeSet<u16> = list.table.classes.iter().map(|c| c.raw_id).collect();
+    let unlabelled = list.unlabelled_ids();
+    let mut unknown = BTreeSet::new();
+    for frame in labelled.iter().step_by(labelled.len().div_ceil(CHECKED_IMAGES).max(1)) {
+        let Some(file) = &frame.label else { continue };
+        for id in decode(folder, file, frame.number, size)?.0 {
+            if known.contains(&id) {
+                return Ok(());
+            }
+            if !unlabelled.contains(&id) {
+                unknown.insert(id);
+            }
+        }
+    }
+    if unknown.is_empty() {
+        return Ok(()); // nothing is labelled there
+    }
+    let shown: Vec<String> = unknown.iter().take(8).map(u16::to_string).collect();
+    let more = if unknown.len() > 8 { ", ..." } else { "" };
+    let found = format!("none of the ids in the label images ({}{more})", shown.join(", "));
+    Err(invalid(&list.name, None, "classes", found, "the list that belongs to the label images"))
 }
 
 /// All raw ids of all label images.
@@ -138,72 +252,11 @@ fn scan(folder: &Folder, frames: &[Entry], size: Size) -> Result<BTreeSet<u16>, 
     let mut present = vec![false; 1 << 16];
     for frame in frames {
         let Some(file) = &frame.label else { continue };
-        for id in decode(folder, file, frame.number, size)? {
+        for id in decode(folder, file, frame.number, size)?.0 {
             present[usize::from(id)] = true;
         }
     }
     Ok((0..=u16::MAX).filter(|&id| present[usize::from(id)]).collect())
-}
-
-/// `{"7": {"name": "bed", "color": [86, 117, 191]}}` (colour optional): the classes by id, and
-/// the id that means "no label".
-fn class_list(
-    folder: &Folder,
-    wanted_void: Option<u16>,
-) -> Result<(Vec<Class>, Option<u16>), SequenceError> {
-    let error = |field: String, found: String, expected: &str| {
-        invalid(CLASSES_FILE, None, field, found, expected)
-    };
-    let json = folder.json(CLASSES_FILE)?;
-    let listed = json.as_object().ok_or_else(|| {
-        error("classes".into(), "no object".into(), r#"{"id": {"name": .., "color": ..}}"#)
-    })?;
-    let mut classes = BTreeMap::new();
-    for (key, value) in listed {
-        let id: u16 = key.parse().map_err(|_| {
-            error("class id".into(), shortened(key), "a whole number from 0 to 65535")
-        })?;
-        let name = value.get("name").and_then(|n| n.as_str()).ok_or_else(|| {
-            error(format!("class {id}: name"), shortened(&value.to_string()), "a text")
-        })?;
-        let color = match value.get("color") {
-            None => class_color(id),
-            Some(color) => serde_json::from_value(color.clone()).map_err(|_| {
-                let found = shortened(&color.to_string());
-                error(format!("class {id}: color"), found, "three numbers from 0 to 255")
-            })?,
-        };
-        if classes.insert(id, Class { raw_id: id, name: name.into(), color }).is_some() {
-            return Err(error("class id".into(), format!("{id} twice"), "each id once"));
-        }
-    }
-    let is_void = |c: &&Class| {
-        let name = c.name.to_lowercase();
-        ["void", "unlabelled", "unlabeled"].contains(&name.as_str())
-    };
-    let void = wanted_void
-        .or_else(|| classes.values().find(is_void).map(|c| c.raw_id))
-        .or_else(|| (!classes.contains_key(&DEFAULT_VOID)).then_some(DEFAULT_VOID));
-    if let Some(void) = void {
-        classes.remove(&void);
-    }
-    Ok((classes.into_values().collect(), void))
-}
-
-fn unnamed_class(id: u16) -> Class {
-    Class { raw_id: id, name: format!("class {id}"), color: class_color(id) }
-}
-
-/// A colour for a class without one: hues a golden ratio apart, in three brightnesses.
-pub fn class_color(id: u16) -> [u8; 3] {
-    let hue = f64::from(id) * 0.618_033_988_749_895 % 1.0 * 6.0;
-    let value = [240.0, 200.0, 160.0][usize::from(id % 3)];
-    let channel = |shift: f64| {
-        let k = (shift + hue) % 6.0;
-        let fall = k.min(4.0 - k).clamp(0.0, 1.0);
-        (value * (1.0 - 0.7 * fall)) as u8
-    };
-    [channel(5.0), channel(3.0), channel(1.0)]
 }
 
 /// Label files for frames: by the stem of the colour or depth file's name, else by number.
@@ -266,43 +319,11 @@ fn stem(name: &str) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::MemorySource;
-
-    fn listed(text: &str, void: Option<u16>) -> Result<(Vec<Class>, Option<u16>), SequenceError> {
-        let mut m = MemorySource::new("m");
-        m.insert(CLASSES_FILE, text);
-        class_list(&Folder::new(Box::new(m)).unwrap(), void)
-    }
 
     #[test]
-    fn class_lists_are_in_numeric_order_and_void_is_no_class() {
-        let text = r#"{"10": {"name": "bin", "color": [1, 2, 3]}, "9": {"name": "bed"},
-            "0": {"name": "Void"}}"#;
-        let (classes, void) = listed(text, None).unwrap();
-        let ids: Vec<u16> = classes.iter().map(|c| c.raw_id).collect();
-        assert_eq!((ids, void), (vec![9, 10], Some(0)));
-        assert_eq!(classes[1].color, [1, 2, 3]);
-        assert_eq!(listed(text, Some(9)).unwrap().0.len(), 2);
-        assert_eq!(listed(r#"{"255": {"name": "wall"}}"#, None).unwrap().1, None);
-        for (text, part) in [
-            ("[]", "no object"),
-            (r#"{"a": {"name": "x"}}"#, "class id"),
-            (r#"{"70000": {"name": "x"}}"#, "class id"),
-            (r#"{"7": {}}"#, "class 7: name"),
-            (r#"{"7": {"name": "x", "color": [1, 2, 300]}}"#, "class 7: color"),
-            (r#"{"7": {"name": "x"}, "07": {"name": "y"}}"#, "7 twice"),
-        ] {
-            let e = listed(text, None).unwrap_err().to_string();
-            assert!(e.contains(part) && e.contains("classes.json"), "{text}: {e}");
-        }
-    }
-
-    #[test]
-    fn stems_and_colours() {
+    fn stems_drop_folder_extension_and_word() {
         assert_eq!(stem("a/frame-01.color.png"), "frame-01");
         assert_eq!(stem("rgb/1341.25.png"), "1341.25");
         assert_eq!(stem("plain"), "plain");
-        let colors: BTreeSet<[u8; 3]> = (0..255).map(class_color).collect();
-        assert!(colors.len() > 250, "{}", colors.len());
     }
 }

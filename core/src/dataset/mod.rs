@@ -12,9 +12,11 @@
 //!   units per metre, `k1 k2 p1 p2 k3` if there is distortion; also one folder up),
 //!   `camera-intrinsics.txt` (a 3x3 matrix) or `camera.txt` (`fx fy cx cy [k1 k2 p1 p2 k3]`);
 //! - `bound.json`: `{"bound": [[x0, x1], [y0, y1], [z0, z1]]}` in metres;
-//! - `classes.json`: `{"7": {"name": "bed", "color": [86, 117, 191]}}`, colour optional.
+//! - `classes.json`: `{"7": {"name": "bed", "color": [86, 117, 191]}}`, colour optional. Without
+//!   it a [`ClassList`] can be given, and else every id in the images is a class.
 //!
 //! Frames are in numeric order, and the world frame is the data set's own.
+mod class_list;
 mod decode;
 mod entries;
 mod folder;
@@ -27,8 +29,8 @@ mod resize;
 mod tum;
 mod write;
 
+pub use class_list::{ClassList, class_color};
 pub use decode::MAX_SIDE;
-pub use labels::class_color;
 pub use layout::Layout;
 pub use memory::MemorySource;
 pub use reader::{LabelSource, OpenOptions, open};

@@ -1,10 +1,11 @@
 //! Opening a recording, and decoding its frames.
 use super::{
+    class_list::ClassList,
     decode::{self, Origin, Size},
     entries::{self, Entry},
     folder::{Folder, invalid, plural},
     intrinsics::Rectifier,
-    labels::{Labels, Wanted},
+    labels::{ASPECT_TOLERANCE, Labels, Wanted},
     layout::Layout,
     resize::Resize,
 };
@@ -46,6 +47,8 @@ pub struct OpenOptions {
     pub scale: f64,
     /// Where labels come from.
     pub labels: LabelSource,
+    /// The classes, instead of those of any `classes.json`.
+    pub classes: Option<ClassList>,
     /// The raw label id that means "no label". By default the class named `void`, `unlabelled`
     /// or `unlabeled` in `classes.json`, or else 255 unless that is a listed class.
     pub unlabelled_raw_id: Option<u16>,
@@ -63,6 +66,7 @@ impl Default for OpenOptions {
             frames: None,
             scale: 1.0,
             labels: LabelSource::default(),
+            classes: None,
             unlabelled_raw_id: None,
             only_present_classes: false,
         }
@@ -144,8 +148,11 @@ pub fn open(
     }
     camera = resize.camera(&camera);
 
-    let classes_wanted =
-        Wanted { void: options.unlabelled_raw_id, only_present: options.only_present_classes };
+    let classes_wanted = Wanted {
+        list: options.classes,
+        unlabelled: options.unlabelled_raw_id,
+        only_present: options.only_present_classes,
+    };
     let labels = match options.labels {
         LabelSource::None => None,
         LabelSource::Dataset => {
@@ -191,7 +198,7 @@ pub fn open(
 fn check_aspect(file: &str, frame: u64, color: Size, depth: Size) -> Result<(), SequenceError> {
     let aspect = |s: Size| f64::from(s.0) / f64::from(s.1);
     let ratio = aspect(color) / aspect(depth);
-    if (ratio - 1.0).abs() > 0.03 {
+    if (ratio - 1.0).abs() > ASPECT_TOLERANCE {
         return Err(invalid(
             file,
             Some(frame),
@@ -287,7 +294,7 @@ impl Sequence for Reader {
     }
 
     fn warnings(&self) -> Vec<String> {
-        let unknown = self.labels.as_ref().and_then(Labels::warning);
-        self.warnings.iter().cloned().chain(unknown).collect()
+        let met = self.labels.as_ref().map(Labels::warnings).unwrap_or_default();
+        self.warnings.iter().cloned().chain(met).collect()
     }
 }

@@ -1,6 +1,6 @@
 //! `mte-slam eval`: the figures again, from files alone.
 use crate::{
-    args::{CullChoice, EvalArgs, SelectionArgs},
+    args::{ClassArgs, CullChoice, EvalArgs, SelectionArgs},
     class_truth::ClassTruth,
     evaluation::{self, MeshTruth, ViewScores},
     input,
@@ -45,6 +45,10 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
         scale: record.scale,
         labels: args.labels.clone().unwrap_or_else(|| record.labels.clone()),
         truth_labels: args.truth_labels.clone(),
+        classes: ClassArgs {
+            classes: args.classes.classes.clone().or(record.classes.clone()),
+            unlabelled: args.classes.unlabelled.or(record.unlabelled),
+        },
     };
     let mut sequence = match input::open(&args.dataset, &selection, screen) {
         // Where the run's labels have gone the rest can still be measured.

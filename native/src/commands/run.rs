@@ -41,6 +41,8 @@ pub fn run(args: &RunArgs, screen: Screen) -> Result<()> {
         scale: args.selection.scale,
         labels: args.selection.labels.clone(),
         truth_labels: class_truth.name.clone(),
+        classes: args.selection.classes.classes.clone(),
+        unlabelled: args.selection.classes.unlabelled,
         ..RunRecord::default()
     };
     let default_out =

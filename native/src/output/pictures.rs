@@ -32,9 +32,10 @@ pub fn class_png(width: u32, height: u32, class: &[u8], table: &ClassTable) -> R
     encode(width, height, &bytes, ExtendedColorType::L16)
 }
 
-/// The raw id that class images hold where there is no class: 0, or 65535 if 0 is a class.
+/// The raw id that class images hold where there is no class: 0, or the greatest that is no class.
 pub fn unlabelled_id(table: &ClassTable) -> u16 {
-    if table.classes.iter().any(|c| c.raw_id == 0) { u16::MAX } else { 0 }
+    let free = |id: &u16| table.classes.iter().all(|c| c.raw_id != *id);
+    std::iter::once(0).chain((1..=u16::MAX).rev()).find(free).unwrap_or(0)
 }
 
 /// Display colour of a compact class index; black without one.
@@ -129,6 +130,8 @@ mod tests {
         assert_eq!(read(&table), [300, 7, 0]);
         table.classes.push(class(0));
         assert_eq!(read(&table), [300, 7, 65535]);
+        table.classes.push(class(65535));
+        assert_eq!(read(&table), [300, 7, 65534]);
     }
 
     #[test]
