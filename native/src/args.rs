@@ -1,6 +1,8 @@
 //! The command line as clap reads it. The texts here are the program's manual, so they teach:
 //! what a command does, what it writes, and an example to copy.
 use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
+use glam::{DQuat, DVec3};
+use mte_slam_core::pose::Pose;
 use std::path::PathBuf;
 
 /// Neural RGB-D semantic SLAM on any GPU, or none.
@@ -56,8 +58,9 @@ pub enum Command {
         metrics.json         every figure with its protocol\n    \
         timings.csv          seconds of each frame\n    \
         config.toml          the complete effective configuration; --config takes it back\n    \
-        mesh.ply, mesh.glb, mesh_semantic.ply\n    \
-        renders/             colour, depth [mm], classes and a comparison sheet of every K-th frame\n    \
+        mesh.ply, mesh.glb   coloured; mesh_semantic.* in class colours, with ids (PLY) or a material a class (GLB)\n    \
+        legend.png, confusion.png, classes.csv   the classes, with figures where there are true labels\n    \
+        renders/             colour, depth [mm], classes (ids, and in colour) and a comparison sheet of every K-th frame\n    \
         checkpoint.safetensors   the map; `mesh` and `render` read it\n\n\
         Examples:\n    \
         mte-slam run data/room0\n    \
@@ -76,15 +79,18 @@ pub enum Command {
     /// Extract the mesh of an output folder's map again, for example finer
     #[command(
         long_about = "Extract the mesh of an output folder's checkpoint again, at any resolution, \
-        and replace OUT/mesh.ply, mesh.glb and (with classes) mesh_semantic.ply.\n\n\
+        and replace OUT/mesh.ply, mesh.glb and (with classes) mesh_semantic.ply and .glb.\n\n\
         Example:\n    mte-slam mesh out/room0-replica --resolution 0.01"
     )]
     Mesh(MeshArgs),
-    /// Render colour, depth and classes of an output folder's map at a frame's pose
+    /// Render colour, depth and classes of an output folder's map from any pose
     #[command(
-        long_about = "Render colour, depth and classes from an output folder's checkpoint at the \
-        estimated pose of one frame, without any depth input, into OUT/renders.\n\n\
-        Example:\n    mte-slam render out/room0-replica --frame 42"
+        long_about = "Render colour, depth and classes from an output folder's checkpoint, without \
+        any depth input: at the estimated pose of one frame (into OUT/renders), or at a pose or \
+        along a path that no camera took (into OUT/views).\n\n\
+        Examples:\n    mte-slam render out/room0-replica --frame 42\n    \
+        mte-slam render out/room0-replica --pose \"0.5 -1 0.2  0 0 0 1\"\n    \
+        mte-slam render out/room0-replica --path tour.txt"
     )]
     Render(RenderArgs),
     /// Write the built-in sequence to a folder, in Replica layout
@@ -341,12 +347,28 @@ pub struct RenderArgs {
     /// Output folder of a run.
     #[arg(value_name = "OUT", value_hint = ValueHint::DirPath)]
     pub out: PathBuf,
-    /// Frame whose estimated pose is taken (counted from 0, as the pictures are named).
-    #[arg(long, value_name = "I")]
-    pub frame: usize,
+    /// Where to look from.
+    #[command(flatten)]
+    pub from: ViewArgs,
     /// Engine.
     #[command(flatten)]
     pub engine: EngineArgs,
+}
+
+/// Where to look from: one of these. Poses are `world_from_camera` in the world of
+/// OUT/trajectory.txt; the camera looks along its z axis, x points right and y down.
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+pub struct ViewArgs {
+    /// Frame whose estimated pose is taken (counted from 0, as the pictures are named).
+    #[arg(long, value_name = "I")]
+    pub frame: Option<usize>,
+    /// A pose: position in metres and quaternion, in quotes.
+    #[arg(long, value_name = "tx ty tz qx qy qz qw", value_parser = pose, allow_hyphen_values = true)]
+    pub pose: Option<Pose>,
+    /// A path of poses, `t tx ty tz qx qy qz qw` a line (TUM format).
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub path: Option<PathBuf>,
 }
 
 /// `synth`.
@@ -384,6 +406,24 @@ pub struct ShadersArgs {
     /// Folder to write to.
     #[arg(value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub dir: PathBuf,
+}
+
+fn pose(text: &str) -> Result<Pose, String> {
+    let expected = "expected 7 numbers: tx ty tz in metres, qx qy qz qw of length 1";
+    let numbers: Vec<f64> = text
+        .split_whitespace()
+        .map(str::parse)
+        .collect::<Result<_, _>>()
+        .map_err(|_| format!("found something that is no number, {expected}"))?;
+    let [x, y, z, qx, qy, qz, qw] = numbers[..] else {
+        return Err(format!("found {} numbers, {expected}", numbers.len()));
+    };
+    let (t, q) = (DVec3::new(x, y, z), DQuat::from_xyzw(qx, qy, qz, qw));
+    // As in files of poses: more than rounding is a mistake, such as another order.
+    if !t.is_finite() || !(0.99..=1.01).contains(&q.length()) {
+        return Err(format!("found a quaternion of length {}, {expected}", q.length()));
+    }
+    Ok(Pose::from_quaternion(t, q))
 }
 
 fn at_least_one(text: &str) -> Result<usize, String> {

@@ -5,11 +5,12 @@ use crate::{
 };
 use anyhow::{Context, Result, bail};
 use mte_slam_core::{
+    classes::ClassTable,
     frame::{Frame, SequenceInfo},
     mesh::{self, CullProtocol, Keep, Mesh, Visibility},
     metrics::{
-        self, AteReport, DepthMeter, PosePair, PsnrMeter, SemanticMeter, SurfaceOptions,
-        SurfaceReport, TrajectoryError, align_rigid, ate, evaluate_surface,
+        self, AteReport, ConfusionMatrix, DepthMeter, PosePair, PsnrMeter, SemanticMeter,
+        SurfaceOptions, SurfaceReport, TrajectoryError, align_rigid, ate, evaluate_surface,
     },
     pose::Pose,
     sequence::Sequence,
@@ -98,9 +99,14 @@ impl ViewScores {
         Ok(())
     }
 
+    /// Classes that are scored, and the counts so far.
+    pub fn confusion(&self) -> (&ClassTable, &ConfusionMatrix) {
+        (&self.truth.table, self.classes.confusion())
+    }
+
     /// Put the figures, or why there are none, into `metrics`. `unlabelled_id` is that of the
     /// class pictures.
-    pub fn report(self, unlabelled_id: u16, metrics: &mut Metrics) {
+    pub fn report(&mut self, unlabelled_id: u16, metrics: &mut Metrics) {
         if self.frames.is_empty() {
             for section in ["depth", "color", "semantics"] {
                 metrics.absent.insert(section, "no frame was rendered".to_owned());
@@ -126,7 +132,7 @@ impl ViewScores {
         metrics.warnings.extend(self.truth.warnings());
         metrics.renders = Some(RenderRecord {
             protocol: "at estimated poses, without depth input",
-            frames: self.frames,
+            frames: self.frames.clone(),
             unlabelled_id,
         });
     }

@@ -6,7 +6,7 @@ use crate::{
     engine,
     evaluation::{self, MeshTruth, ViewScores},
     output::{
-        checkpoint,
+        checkpoint, classes,
         folder::OutputFolder,
         meshes,
         metrics::{ConfigurationRecord, MemoryFigures, Metrics, SequenceRecord, TimeFigures},
@@ -83,7 +83,7 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
 
     let (timings, labelled) = process(&mut slam, sequence.as_mut(), &record.dataset, screen)?;
     // Without a single label the map's classes mean nothing: none are shown.
-    let classes = if labelled { info.classes.clone() } else { ClassTable::default() };
+    let of_map = if labelled { info.classes.clone() } else { ClassTable::default() };
     let estimates = slam.trajectory();
     let truth: Vec<_> = estimates.iter().map(|e| sequence.truth(e.frame)).collect();
 
@@ -107,15 +107,16 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
     if output.render_every > 0 {
         let chosen: Vec<_> = estimates.iter().step_by(output.render_every).copied().collect();
         let sequence = sequence.as_mut();
-        render_views(&mut slam, sequence, &folder, &chosen, &classes, &mut scores, screen)?;
+        render_views(&mut slam, sequence, &folder, &chosen, &of_map, &mut scores, screen)?;
     }
     scores.report(pictures::unlabelled_id(&info.classes), &mut metrics);
+    write_classes(&folder, &of_map, &scores, &metrics)?;
     if output.no_mesh {
         metrics.absent.insert("mesh", "--no-mesh was given".to_owned());
     } else {
         let resolution = output.mesh_resolution.unwrap_or(effective.config.mesh.resolution_m);
         let mesh = extract_mesh(&mut slam, resolution, screen)?;
-        meshes::write(&mesh, &classes, &mut |name, bytes| folder.write(name, bytes))?;
+        meshes::write(&mesh, &of_map, &mut |name, bytes| folder.write(name, bytes))?;
         match job.truth_mesh {
             Ok(true_mesh) => {
                 screen.note("comparing the mesh with the true one");
@@ -293,7 +294,7 @@ fn render_views(
     sequence: &mut dyn Sequence,
     folder: &OutputFolder,
     chosen: &[PoseEstimate],
-    classes: &ClassTable,
+    of_map: &ClassTable,
     scores: &mut ViewScores,
     screen: Screen,
 ) -> Result<()> {
@@ -304,7 +305,7 @@ fn render_views(
         let mut view = block_on(slam.render(&estimate.world_from_camera, &info.camera))
             .with_context(|| format!("rendering frame {}", estimate.frame))?;
         let stem = format!("renders/{:06}", estimate.frame);
-        write_view(&view, classes, &mut |kind, bytes| {
+        write_view(&view, of_map, &mut |kind, bytes| {
             folder.write(&format!("{stem}.{kind}.png"), bytes)
         })?;
         let truth = scores.truth();
@@ -323,7 +324,7 @@ fn render_views(
             frame: &frame,
             depth_unit_m: info.depth_unit_m,
             view: &view,
-            table: if classes.is_empty() { &no_classes } else { &truth.table },
+            table: if of_map.is_empty() { &no_classes } else { &truth.table },
             true_labels: labels.as_deref(),
             own_truth: truth.is_own(),
         })?;
@@ -334,7 +335,28 @@ fn render_views(
     Ok(())
 }
 
-/// Colour, depth and, with classes, class picture of a view, given to `write` with their kind.
+/// Legend, and with figures the confusion matrix and the table of classes.
+fn write_classes(
+    folder: &OutputFolder,
+    of_map: &ClassTable,
+    scores: &ViewScores,
+    metrics: &Metrics,
+) -> Result<()> {
+    let (table, matrix) = scores.confusion();
+    let figures = metrics.semantics.as_ref();
+    let shown = if figures.is_some() { table } else { of_map };
+    if !shown.is_empty() {
+        folder.write("legend.png", &classes::legend(shown, figures)?)?;
+    }
+    if let Some(figures) = figures {
+        folder.write("confusion.png", &classes::confusion(table, matrix)?)?;
+        let csv = classes::csv(figures, metrics.input_labels.as_ref());
+        folder.write("classes.csv", csv.as_bytes())?;
+    }
+    Ok(())
+}
+
+/// Colour, depth and, with classes, class pictures of a view, given to `write` with their kind.
 pub fn write_view(
     view: &View,
     table: &ClassTable,
@@ -345,6 +367,7 @@ pub fn write_view(
     write("depth", &pictures::depth_png(w, h, &view.depth_m)?)?;
     if !table.is_empty() {
         write("class", &pictures::class_png(w, h, &view.class, table)?)?;
+        write("class_color", &pictures::class_color_png(w, h, &view.class, table)?)?;
     }
     Ok(())
 }

@@ -139,9 +139,13 @@ fn demo_writes_every_file_and_they_can_be_read() {
         names(&out),
         [
             "checkpoint.safetensors",
+            "classes.csv",
             "config.toml",
+            "confusion.png",
+            "legend.png",
             "mesh.glb",
             "mesh.ply",
+            "mesh_semantic.glb",
             "mesh_semantic.ply",
             "metrics.json",
             "renders",
@@ -172,16 +176,27 @@ fn demo_writes_every_file_and_they_can_be_read() {
         let ply = fs::read(out.join(file)).unwrap();
         assert!(ply.starts_with(b"ply\nformat binary_little_endian 1.0\n"), "{file}");
     }
-    assert!(fs::read(out.join("mesh.glb")).unwrap().starts_with(b"glTF"));
+    for file in ["mesh.glb", "mesh_semantic.glb"] {
+        assert!(fs::read(out.join(file)).unwrap().starts_with(b"glTF"), "{file}");
+    }
+    let csv = read(out.join("classes.csv"));
+    let json: Value = serde_json::from_str(&read(out.join("metrics.json"))).unwrap();
+    let classes = json["semantics"]["classes"].as_array().unwrap();
+    assert_eq!(csv.lines().count(), classes.len() + 1);
+    assert!(csv.starts_with("id,name,pixels,iou_percent,"), "{csv}");
+    for file in ["legend.png", "confusion.png"] {
+        let image = image::open(out.join(file)).unwrap();
+        assert!(image.width() > 200 && image.height() > 100, "{file}");
+    }
     let mut pictures = Vec::new();
     for frame in ["000000", "000004"] {
-        for kind in ["class", "color", "depth", "sheet"] {
+        for kind in ["class", "class_color", "color", "depth", "sheet"] {
             let name = format!("{frame}.{kind}.png");
             let image = image::open(out.join("renders").join(&name)).unwrap();
             if kind != "sheet" {
                 assert_eq!((image.width(), image.height()), (64, 48), "{name}");
                 let deep = image.color() == image::ColorType::L16;
-                assert_eq!(deep, kind != "color", "{name}");
+                assert_eq!(deep, !kind.ends_with("color"), "{name}");
             }
             pictures.push(name);
         }
@@ -262,6 +277,29 @@ fn eval_mesh_and_render_work_from_the_files_of_a_run() {
     assert!(fs::read(&rendered).unwrap() == first, "the restored map renders the same");
     succeed(folder.path(), &["render", "demo", "--frame", "5", "--engine", "cpu"]);
     assert!(demo.join("renders/000005.depth.png").is_file());
+    // The same pose given as numbers shows the same, and a path is a folder of views.
+    let trajectory = read(demo.join("trajectory.txt"));
+    let pose = trajectory.lines().nth(6).unwrap().split_once(' ').unwrap().1;
+    succeed(folder.path(), &["render", "demo", "--pose", pose, "--engine", "cpu"]);
+    let frame = image::open(demo.join("renders/000005.class.png")).unwrap().into_luma16();
+    let view = image::open(demo.join("views/pose.class.png")).unwrap().into_luma16();
+    let differ = frame.pixels().zip(view.pixels()).filter(|(a, b)| a != b).count();
+    assert!(differ < 10, "{differ} pixels differ");
+    fs::write(folder.path().join("tour.txt"), &trajectory).unwrap();
+    succeed(folder.path(), &["render", "demo", "--path", "tour.txt", "--engine", "cpu", "-q"]);
+    for kind in ["class", "class_color", "color", "depth"] {
+        assert!(demo.join(format!("views/000005.{kind}.png")).is_file(), "{kind}");
+    }
+    fs::write(folder.path().join("tour.txt"), "0 1 2\n").unwrap();
+    let render =
+        |extra: [&'static str; 2]| ["render", "demo", "--engine", "cpu", extra[0], extra[1]];
+    fail(folder.path(), &render(["--path", "tour.txt"]), 1, &["tour.txt line 1", "8"]);
+    fs::write(folder.path().join("tour.txt"), "# nothing\n").unwrap();
+    fail(folder.path(), &render(["--path", "tour.txt"]), 1, &["tour.txt", "no poses"]);
+    fail(folder.path(), &render(["--pose", "1 2 3 0 0 0 2"]), 2, &["--pose", "length 2"]);
+    fail(folder.path(), &render(["--pose", "1 2 3"]), 2, &["--pose", "3 numbers", "7 numbers"]);
+    fail(folder.path(), &render(["--pose", "1 2 3 0 0 nan 1"]), 2, &["--pose", "length NaN"]);
+    fail(folder.path(), &["render", "demo"], 2, &["--frame", "--pose", "--path"]);
     let range: [&str; 2] = ["found 77", "6 frames"];
     fail(folder.path(), &["render", "demo", "--frame", "77", "--engine", "cpu"], 1, &range);
 }

@@ -18,7 +18,7 @@ pub use cull::{CullProtocol, Keep, View, Visibility, cull, observed_part};
 pub use glb::{write_glb, write_glb_by_class};
 pub use marching::{Block, BlockMesher};
 pub use ply_read::{PlyError, read_ply};
-pub use ply_write::write_ply;
+pub use ply_write::{write_ply, write_ply_by_class};
 pub use raster::{Raster, rasterise};
 
 use crate::pose::Pose;

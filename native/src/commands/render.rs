@@ -1,36 +1,64 @@
 //! `mte-slam render`.
 use crate::{
     args::RenderArgs,
-    output::folder::replace_file,
+    output::{folder::replace_file, trajectory::read_tum},
     pipeline::{restore, write_view},
     screen::Screen,
 };
 use anyhow::{Context, Result, bail};
+use mte_slam_core::pose::Pose;
 use pollster::block_on;
 
-/// Render a frame's pose from a checkpoint.
+/// Render a map from a checkpoint.
 pub fn run(args: &RenderArgs, screen: Screen) -> Result<()> {
+    // What can be wrong with a file of poses comes before anything slow.
+    let mut views = chosen_poses(args)?;
     let mut slam = restore(&args.out, &args.engine, screen)?;
-    let estimates = slam.trajectory();
-    let Some(estimate) = estimates.get(args.frame) else {
-        bail!(
-            "--frame: found {}, expected one of the {} frames of {}, counted from 0",
-            args.frame,
-            estimates.len(),
-            args.out.display()
-        );
-    };
+    if let Some(frame) = args.from.frame {
+        let estimates = slam.trajectory();
+        let Some(estimate) = estimates.get(frame) else {
+            bail!(
+                "--frame: found {frame}, expected one of the {} frames of {}, counted from 0",
+                estimates.len(),
+                args.out.display()
+            );
+        };
+        views.push((format!("renders/{frame:06}"), estimate.world_from_camera));
+    }
     let camera = slam.info().camera;
     let classes = slam.info().classes.clone();
-    let view = block_on(slam.render(&estimate.world_from_camera, &camera))
-        .with_context(|| format!("rendering frame {}", args.frame))?;
     let mut names = Vec::new();
-    write_view(&view, &classes, &mut |kind, bytes| {
-        let path = args.out.join(format!("renders/{:06}.{kind}.png", args.frame));
-        names.push(path.display().to_string());
-        replace_file(&path, bytes)
-    })?;
-    let json = serde_json::json!({ "frame": args.frame, "files": names });
+    let mut progress = screen.progress("rendering", views.len());
+    for (i, (stem, pose)) in views.iter().enumerate() {
+        let view = block_on(slam.render(pose, &camera)).with_context(|| format!("view {stem}"))?;
+        write_view(&view, &classes, &mut |kind, bytes| {
+            let path = args.out.join(format!("{stem}.{kind}.png"));
+            names.push(path.display().to_string());
+            replace_file(&path, bytes)
+        })?;
+        progress.set(i as u64 + 1, String::new);
+    }
+    progress.finish();
+    let mut json = serde_json::json!({ "files": names });
+    if let Some(frame) = args.from.frame {
+        json["frame"] = frame.into();
+    }
     screen.result(&format!("{}\n", names.join("\n")), &format!("{json:#}\n"));
     Ok(())
+}
+
+/// Names of the pictures, below OUT, and poses of `--pose` or `--path`.
+fn chosen_poses(args: &RenderArgs) -> Result<Vec<(String, Pose)>> {
+    if let Some(pose) = args.from.pose {
+        return Ok(vec![("views/pose".to_owned(), pose)]);
+    }
+    let Some(path) = &args.from.path else { return Ok(Vec::new()) };
+    let name = path.display().to_string();
+    let text = std::fs::read_to_string(path).with_context(|| format!("{name}: cannot be read"))?;
+    let poses = read_tum(&name, &text)?;
+    if poses.is_empty() {
+        bail!("{name}: found no poses, expected lines of t tx ty tz qx qy qz qw");
+    }
+    let named = |(i, (_, pose)): (usize, &(f64, Pose))| (format!("views/{i:06}"), *pose);
+    Ok(poses.iter().enumerate().map(named).collect())
 }

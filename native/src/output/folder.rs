@@ -15,7 +15,7 @@ const STAGING: &str = ".partial";
 const MARKERS: [&str; 2] = ["metrics.json", "config.toml"];
 /// What a run writes, and therefore what a new run in the same folder takes away first, so that
 /// no file of the old run stays beside files of the new one. `metrics.json` is renamed last.
-const OURS: [&str; 13] = [
+const OURS: [&str; 18] = [
     "metrics.json",
     "eval.json",
     "trajectory.txt",
@@ -25,10 +25,15 @@ const OURS: [&str; 13] = [
     "config.toml",
     "mesh.ply",
     "mesh_semantic.ply",
+    "mesh_semantic.glb",
+    "classes.csv",
+    "legend.png",
+    "confusion.png",
     "mesh.glb",
     "checkpoint.safetensors",
     "metrics.json.tmp",
     "renders",
+    "views",
 ];
 
 /// A folder being filled.

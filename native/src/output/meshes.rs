@@ -1,12 +1,14 @@
 //! Mesh files.
+use super::pictures::unlabelled_id;
 use anyhow::{Context, Result};
 use mte_slam_core::{
     classes::ClassTable,
-    mesh::{Mesh, write_glb, write_ply},
+    mesh::{Mesh, write_glb, write_glb_by_class, write_ply, write_ply_by_class},
 };
 
-/// `mesh.ply` and `mesh.glb` with colours and, with classes, `mesh_semantic.ply` in the classes'
-/// colours, given to `write` with their names.
+/// `mesh.ply` and `mesh.glb` with colours and, with classes, `mesh_semantic.ply` (the classes'
+/// colours and raw ids) and `mesh_semantic.glb` (a material a class), given to `write` with their
+/// names.
 pub fn write(
     mesh: &Mesh,
     table: &ClassTable,
@@ -16,10 +18,9 @@ pub fn write(
     write("mesh.ply", &write_ply(mesh).context(failed)?)?;
     write("mesh.glb", &write_glb(mesh).context(failed)?)?;
     if !table.is_empty() && mesh.classes.len() == mesh.positions.len() {
-        let mut colored = mesh.clone();
-        colored.colors =
-            mesh.classes.iter().map(|&c| super::pictures::class_color(c, table)).collect();
-        write("mesh_semantic.ply", &write_ply(&colored).context(failed)?)?;
+        let ply = write_ply_by_class(mesh, table, unlabelled_id(table)).context(failed)?;
+        write("mesh_semantic.ply", &ply)?;
+        write("mesh_semantic.glb", &write_glb_by_class(mesh, table).context(failed)?)?;
     }
     Ok(())
 }

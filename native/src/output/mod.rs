@@ -1,5 +1,6 @@
 //! Everything the program writes.
 pub mod checkpoint;
+pub mod classes;
 pub mod colormap;
 pub mod folder;
 pub mod font;

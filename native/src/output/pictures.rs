@@ -32,6 +32,17 @@ pub fn class_png(width: u32, height: u32, class: &[u8], table: &ClassTable) -> R
     encode(width, height, &bytes, ExtendedColorType::L16)
 }
 
+/// Classes in their display colours, black without one.
+pub fn class_color_png(
+    width: u32,
+    height: u32,
+    class: &[u8],
+    table: &ClassTable,
+) -> Result<Vec<u8>> {
+    let colors: Vec<[u8; 3]> = class.iter().map(|&c| class_color(c, table)).collect();
+    color_png(width, height, &colors)
+}
+
 /// The raw id that class images hold where there is no class: 0, or the greatest that is no class.
 pub fn unlabelled_id(table: &ClassTable) -> u16 {
     let free = |id: &u16| table.classes.iter().all(|c| c.raw_id != *id);
@@ -104,6 +115,20 @@ impl Canvas {
         }
     }
 
+    /// Write text upwards, its start at the bottom left (x, y); see [`Canvas::text`].
+    pub fn text_up(&mut self, x: usize, y: usize, zoom: usize, color: [u8; 3], text: &str) {
+        for (i, c) in text.chars().enumerate() {
+            for (row, bits) in font::glyph(c).iter().enumerate() {
+                for column in (0..font::GLYPH).filter(|k| bits >> k & 1 == 1) {
+                    let along = (i * font::GLYPH + column + 1) * zoom;
+                    if let Some(top) = y.checked_sub(along) {
+                        self.fill(x + row * zoom, top, zoom, zoom, color);
+                    }
+                }
+            }
+        }
+    }
+
     /// As PNG.
     pub fn png(&self) -> Result<Vec<u8>> {
         color_png(self.width as u32, self.height as u32, &self.pixels)
@@ -140,5 +165,13 @@ mod tests {
         canvas.text(8, 0, 1, [255; 3], "A");
         assert!(canvas.pixels.iter().enumerate().all(|(i, p)| p[0] == 0 || i % 16 >= 8));
         assert!(canvas.pixels.iter().filter(|p| p[0] == 255).count() > 20);
+        // Upwards: the same glyph, a quarter turn to the left.
+        let mut turned = Canvas::new(8, 16, [0; 3]);
+        turned.text_up(0, 16, 1, [255; 3], " A");
+        for y in 0..8 {
+            for x in 0..8 {
+                assert_eq!(canvas.pixels[y * 16 + 8 + x], turned.pixels[(7 - x) * 8 + y]);
+            }
+        }
     }
 }
