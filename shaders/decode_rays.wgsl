@@ -15,6 +15,8 @@
 @group(0) @binding(6) var<storage, read> anchors: array<vec4f>;
 // Per slot and token: fused feature (4) | weight.
 @group(0) @binding(7) var<storage, read> targets: array<vec4f>;
+// Weight of each class in the cross-entropy.
+@group(0) @binding(8) var<storage, read> class_weights: array<f32>;
 
 #import shared/surface.wgsl
 
@@ -91,10 +93,12 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
         }
         let labelled = label < params.classes;
         var df: array<vec4f, 4>;
+        var class_weight = 0.0;
         if (labelled) {
-            loss_semantic = log(sum) + best - own;
+            class_weight = class_weights[label];
+            loss_semantic = class_weight * (log(sum) + best - own);
         }
-        let scale = select(0.0, params.weight_semantic * inv_rays, labelled);
+        let scale = class_weight * params.weight_semantic * inv_rays;
         for (var c = 0u; c < params.classes; c++) {
             let p = exp(class_logit(feature, c) - best) / sum;
             let g = scale * (p - select(0.0, 1.0, c == label));

@@ -69,8 +69,12 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     raw[out + ${RAW_MEAN+1}u] = mean.y;
     raw[out + ${RAW_MEAN+2}u] = mean.z;
     let valid = nearest < 1000.0;
-    raw[out + ${RAW_MEAN+3}u] = select(0.0, 1.0, valid);
-    for (var k = 0u; k < 48u; k++) {
+    raw[out + ${RAW_MEAN+3}u] = 0.0;
+    for (var k = 0u; k < 3u; k++) {
+        raw[out + ${RAW_POINT}u + k] = 0.0;
+    }
+    raw[out + ${RAW_POINT+3}u] = select(0.0, 1.0, valid);
+    for (var k = 0u; k < ${RAW_PATCH}u; k++) {
         raw[out + k] = 0.0;
     }
     if (valid) {
@@ -92,6 +96,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
             }
         }
         for (var k = 0u; k < 3u; k++) {
+            raw[out + ${RAW_POINT}u + k] = world[k] + params.box_min[k];
             raw[out + 3u + k] = world[k] / 8.0 - 0.5;
             var angle = world[k] * (3.14159265 / 8.0);
             for (var band = 0u; band < ${BANDS}u; band++) {

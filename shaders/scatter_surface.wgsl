@@ -52,6 +52,9 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     if ((rays[ray].frame & 0x80000000u) != 0u) {
         return;
     }
+    if (modality == 0u && params.weight_color == 0.0) {
+        return;
+    }
     let unlabelled = ray_class(rays[ray]) >= params.classes && params.weight_compression == 0.0 && params.weight_feature == 0.0;
     if (modality == 1u && (params.classes == 0u || unlabelled)) {
         return;

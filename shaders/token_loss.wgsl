@@ -34,7 +34,12 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
 #for j in 0..4
     targets[to + ${j}u] = vec4f(tokens[f + ${j*4}u], tokens[f + ${j*4+1}u], tokens[f + ${j*4+2}u], tokens[f + ${j*4+3}u]);
 #end
-    targets[to + 4u] = vec4f(raw[source + ${RAW_MEAN+3}u], 0.0, 0.0, 0.0);
+    // A patch across a boundary has no feature that fits all its pixels.
+    var share = 0.0;
+    for (var c = 0u; c < params.classes; c++) {
+        share = max(share, raw[source + ${RAW_HISTOGRAM}u + c]);
+    }
+    targets[to + 4u] = vec4f(raw[source + ${RAW_POINT+3}u] * max(2.0 * share - 1.0, 0.0), 0.0, 0.0, 0.0);
     if (params.train == 0u) {
         return;
     }

@@ -109,6 +109,8 @@ pub struct LossConfig {
     pub color: f64,
     /// Cross-entropy of the rendered classes.
     pub semantic: f64,
+    /// Exponent of the inverse frequency that weighs classes in it: 0 as they come, 1 balanced.
+    pub balance: f64,
 }
 
 /// Tracking.
@@ -153,6 +155,9 @@ pub struct MappingConfig {
     pub first_iterations: u32,
     /// Iterations over all keyframes after the last frame.
     pub final_iterations: u32,
+    /// Iterations of the semantics alone after those: a third of the price, and small classes need
+    /// them.
+    pub semantic_iterations: u32,
     /// Learning rates of the first frame are this much larger.
     pub first_rate_factor: f64,
     /// Adam step of the plane features.
@@ -202,6 +207,8 @@ pub struct FusionConfig {
     pub local_kernel: u32,
     /// Edge of the gate's convolution: 1 or 3.
     pub gate_kernel: u32,
+    /// Give the fusion the map's own semantic feature at each token's point.
+    pub memory: bool,
     /// Training steps a mapping call, half of them on earlier frames.
     pub steps: u32,
     /// Training steps on the first frame.
@@ -216,6 +223,8 @@ pub struct FusionConfig {
     pub balance: f64,
     /// Weight of the feature loss: rays against the fused feature of their pixel.
     pub weight: f64,
+    /// The same while the semantics are trained alone, at the end.
+    pub final_weight: f64,
 }
 
 /// How anchors follow their features.
@@ -248,6 +257,8 @@ pub struct SuppressorConfig {
     pub anchors: u32,
     /// Weight of the compression loss once it is on in full.
     pub weight: f64,
+    /// The same while the semantics are trained alone, at the end.
+    pub final_weight: f64,
     /// Mapping calls before the compression loss begins.
     pub start: u32,
     /// Mapping calls over which it rises.
@@ -340,6 +351,7 @@ impl Default for LossConfig {
             depth: 0.1,
             color: 5.0,
             semantic: 0.1,
+            balance: 0.0,
         }
     }
 }
@@ -364,6 +376,7 @@ impl Default for TrackingConfig {
                 depth: 1.0,
                 color: 5.0,
                 semantic: 0.0,
+                balance: 0.0,
             },
         }
     }
@@ -377,6 +390,7 @@ impl Default for MappingConfig {
             iterations: 15,
             first_iterations: 200,
             final_iterations: 100,
+            semantic_iterations: 400,
             first_rate_factor: 5.0,
             rate_planes: 5e-3,
             rate_decoders: 1e-3,
@@ -406,13 +420,15 @@ impl Default for FusionConfig {
             local: true,
             local_kernel: 1,
             gate_kernel: 1,
+            memory: true,
             steps: 4,
             first_steps: 40,
             rate: 1e-2,
             weight_class: 1.0,
             weight_color: 0.5,
             balance: 0.5,
-            weight: 0.02,
+            weight: 0.0,
+            final_weight: 0.001,
         }
     }
 }
@@ -422,7 +438,8 @@ impl Default for SuppressorConfig {
         SuppressorConfig {
             enabled: true,
             anchors: 128,
-            weight: 0.01,
+            weight: 0.0,
+            final_weight: 0.003,
             start: 1,
             ramp: 10,
             rule: AnchorRule::Mean,
@@ -472,6 +489,7 @@ impl Config {
                 c.mapping.iterations = 10;
                 c.mapping.first_iterations = 120;
                 c.mapping.final_iterations = 40;
+                c.mapping.semantic_iterations = 240;
                 c.sampling.stratified = 20;
                 c.tracking.align_pixels = 2048;
             }
@@ -544,6 +562,7 @@ impl Config {
             not_negative("loss.depth", l.depth)?;
             not_negative("loss.color", l.color)?;
             not_negative("loss.semantic", l.semantic)?;
+            not_negative("loss.balance", l.balance)?;
         }
         let t = &self.tracking;
         count("tracking.align_iterations", t.align_iterations.max(1), 1000, "0 to 1000")?;
@@ -596,9 +615,11 @@ impl Config {
         not_negative("fusion.weight_color", f.weight_color)?;
         not_negative("fusion.balance", f.balance)?;
         not_negative("fusion.weight", f.weight)?;
+        not_negative("fusion.final_weight", f.final_weight)?;
         let a = &self.suppressor;
         count("suppressor.anchors", a.anchors, 256, "1 to 256")?;
         not_negative("suppressor.weight", a.weight)?;
+        not_negative("suppressor.final_weight", a.final_weight)?;
         for (field, x) in [("suppressor.beta", a.beta), ("suppressor.decay", a.decay)] {
             check((0.0..=1.0).contains(&x), field, format!("{x}"), "0 to 1")?;
         }

@@ -92,6 +92,8 @@ pub const CONSTANTS: &[(&str, u32)] = &[
     ("NO_ANCHOR", NO_ANCHOR),
     ("BANDS", crate::kernels::tokens::BANDS),
     ("RAW_PATCH", crate::kernels::tokens::RAW_PATCH),
+    ("RAW_MEMORY", crate::kernels::tokens::RAW_MEMORY),
+    ("RAW_POINT", crate::kernels::tokens::RAW_POINT),
     ("RAW_MEAN", crate::kernels::tokens::RAW_MEAN),
     ("RAW_HISTOGRAM", crate::kernels::tokens::RAW_HISTOGRAM),
     ("GEOMETRY_AT", crate::kernels::tokens::GEOMETRY_AT),
@@ -206,7 +208,7 @@ params! {
         token_rows: u32,
         /// Edge of a token \[pixels\].
         token_size: u32,
-        /// Unused.
-        spare: u32,
+        /// Floats a token's raw inputs take.
+        raw_stride: u32,
     }
 }

@@ -26,8 +26,8 @@ struct Params {
     inv_sigma_distance: f32, inv_sigma_intensity: f32, robust_distance: f32, robust_intensity: f32,
     // Gradients at a sample's pre-activation below this (per ray) are dropped: they move nothing but cost a scatter.
     min_gradient: f32, weight_compression: f32, weight_feature: f32, anchors: u32,
-    // Token grid of the fused features [tokens], edge of a token [pixels].
-    token_columns: u32, token_rows: u32, token_size: u32, spare: u32,
+    // Token grid of the fused features [tokens], edge of a token [pixels], floats of a token's raw inputs.
+    token_columns: u32, token_rows: u32, token_size: u32, raw_stride: u32,
 }
 @group(0) @binding(0) var<uniform> params: Params;
 

@@ -14,6 +14,7 @@ use crate::{
         extract_tokens::EXTRACT_TOKENS,
         gate_backward::GATE_BACKWARD,
         gate_tokens::GATE_TOKENS,
+        recall_tokens::RECALL_TOKENS,
         reduce_partials::{REDUCE_PARTIALS, ReducePartialsParams},
         shared::random_f32,
         token_layer::TOKEN_LAYER,
@@ -27,7 +28,7 @@ use crate::{
             SECOND_AT, SEMANTIC_AT, STATISTICS_AT, TILE, TokenParams,
         },
     },
-    layout::{HEAD_FLOATS, TARGET_FLOATS},
+    layout::{FieldParams, HEAD_FLOATS, TARGET_FLOATS},
     recording::{BufferId, Recording},
 };
 use alloc::{vec, vec::Vec};
@@ -151,7 +152,6 @@ pub struct Fusion {
     raw_stride: u32,
     partials: BufferId,
     head_partials: BufferId,
-    class_weights: BufferId,
     step: u32,
 }
 
@@ -185,7 +185,6 @@ impl Fusion {
             raw_stride,
             partials: e.create_buffer("fusion partials", (CHUNKS * floats) as usize)?,
             head_partials: e.create_buffer("head partials", (CHUNKS * classes * 17) as usize)?,
-            class_weights: e.create_buffer("class weights", padded as usize)?,
             step: 0,
             layers,
         };
@@ -209,7 +208,6 @@ impl Fusion {
         }
         let mut r = Recording::default();
         r.upload(fusion.parameters.values, 0, &w);
-        r.upload(fusion.class_weights, 0, &vec![1.0_f32; padded as usize]);
         e.submit(&r)?;
         Ok(fusion)
     }
@@ -232,13 +230,6 @@ pub(super) fn target_floats(camera: &Camera, config: &FusionConfig) -> usize {
 }
 
 impl Device {
-    /// Weights of the classes in the fusion's cross-entropy, one a class.
-    pub fn upload_class_weights(&self, r: &mut Recording, weights: &[f32]) {
-        if let Some(f) = &self.fusion {
-            r.upload(f.class_weights, 0, weights);
-        }
-    }
-
     fn token_params(&self, f: &Fusion, slot: u32) -> TokenParams {
         let c = &self.camera;
         TokenParams {
@@ -279,6 +270,11 @@ impl Device {
         let n = f.count();
         let inputs = [self.poses, self.color_images, self.depth_images, f.raw];
         r.dispatch_1d(&EXTRACT_TOKENS, &p, &inputs, n);
+        if f.config.memory {
+            let p = FieldParams { raw_stride: f.raw_stride, ..self.base };
+            let inputs = [self.semantic.values, self.decoders.values, f.raw];
+            r.dispatch_1d(&RECALL_TOKENS, &p, &inputs, n);
+        }
         for layer in &f.layers {
             if layer.name == "colour head" || (layer.name == "depthwise" && !f.config.local) {
                 continue;
@@ -304,7 +300,7 @@ impl Device {
             &[
                 f.parameters.values,
                 self.decoders.values,
-                f.class_weights,
+                self.token_class_weights,
                 f.raw,
                 f.tokens,
                 f.token_gradient,

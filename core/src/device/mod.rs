@@ -179,6 +179,10 @@ pub struct Device {
     decoder_partials: BufferId,
     /// Stands for the anchors where there is no suppressor.
     no_anchors: BufferId,
+    /// Weights of the classes in the cross-entropy of rays.
+    class_weights: BufferId,
+    /// The same in the fusion's.
+    token_class_weights: BufferId,
     /// Fused features of all slots' tokens.
     targets: BufferId,
     points: BufferId,
@@ -290,6 +294,8 @@ impl Device {
                 rows * (decoder_floats(classes) - GEOMETRY_FLOATS),
             )?,
             no_anchors: e.create_buffer("no anchors", 4)?,
+            class_weights: e.create_buffer("class weights", classes.max(4) as usize)?,
+            token_class_weights: e.create_buffer("token class weights", classes.max(4) as usize)?,
             targets: e.create_buffer("targets", (slots as usize * targets).max(4))?,
             points: e.create_buffer("points", QUERY_POINTS_MAX * 4)?,
             values: e.create_buffer("values", QUERY_POINTS_MAX * 8)?,
@@ -303,6 +309,8 @@ impl Device {
         r.upload(device.appearance.values, 0, &initial_planes(device.appearance.floats, seed, 1));
         r.upload(device.semantic.values, 0, &initial_planes(device.semantic.floats, seed, 2));
         r.upload(device.decoders.values, 0, &initial_decoders(classes, seed));
+        let equal = vec![1.0_f32; classes as usize];
+        device.upload_class_weights(&mut r, &equal, &equal);
         device.engine.submit(&r)?;
         Ok(device)
     }
@@ -328,6 +336,12 @@ impl Device {
         r.upload(self.color_images, slot as usize * pixels, &color);
         r.upload(self.depth_images, slot as usize * pixels.div_ceil(2), &depth);
         r.clear(self.pose_state, slot as usize * POSE_STATE_FLOATS, POSE_STATE_FLOATS);
+    }
+
+    /// Weights of the classes in the cross-entropy of rays and of the fusion, one a class.
+    pub fn upload_class_weights(&self, r: &mut Recording, rays: &[f32], fusion: &[f32]) {
+        r.upload(self.class_weights, 0, rays);
+        r.upload(self.token_class_weights, 0, fusion);
     }
 
     /// Sets the pose of a slot.

@@ -99,6 +99,7 @@ impl Device {
                 self.logits_gradient,
                 self.suppressor.as_ref().map_or(self.no_anchors, |s| s.anchors),
                 self.targets,
+                self.class_weights,
             ],
             rays,
         );
@@ -171,21 +172,32 @@ impl Device {
                 ],
                 rays * 24,
             );
-            r.dispatch_1d(
-                &SCATTER_SURFACE,
-                &p,
-                &[
-                    self.rays,
-                    self.depths,
-                    self.weights,
-                    self.ray_state,
-                    self.appearance.gradient,
-                    self.semantic.gradient,
-                    self.status,
-                ],
-                rays * if self.classes > 0 { 48 } else { 24 },
-            );
+            self.record_scatter_surface(r, b);
         }
+    }
+
+    /// Gradients of the semantics alone: what [`Device::record_semantic_step`] needs.
+    pub fn record_semantic_backward(&self, r: &mut Recording, b: &Batch<'_>) {
+        self.record_scatter_surface(r, b);
+    }
+
+    fn record_scatter_surface(&self, r: &mut Recording, b: &Batch<'_>) {
+        let p = self.params(b);
+        let rays = p.rays as usize;
+        r.dispatch_1d(
+            &SCATTER_SURFACE,
+            &p,
+            &[
+                self.rays,
+                self.depths,
+                self.weights,
+                self.ray_state,
+                self.appearance.gradient,
+                self.semantic.gradient,
+                self.status,
+            ],
+            rays * if self.classes > 0 { 48 } else { 24 },
+        );
     }
 
     /// One Adam step of the window's poses from the last backward pass.
@@ -215,9 +227,6 @@ impl Device {
 
     /// Decoder gradients from the last backward pass, then Adam on everything.
     pub fn record_step(&mut self, r: &mut Recording, b: &Batch<'_>, rates: Rates) {
-        let p = self.params(b);
-        let floats = self.decoders.floats;
-        let row = (floats - GEOMETRY_FLOATS) as u32;
         r.dispatch_1d(
             &REDUCE_PARTIALS,
             &ReducePartialsParams {
@@ -229,6 +238,19 @@ impl Device {
             &[self.geometry_partials, self.decoders.gradient],
             GEOMETRY_FLOATS,
         );
+        self.record_updates(r, b, rates, true);
+    }
+
+    /// As [`Device::record_step`], of the semantic planes, their decoder and the class head. The
+    /// batch's weight of the colour must be 0.
+    pub fn record_semantic_step(&mut self, r: &mut Recording, b: &Batch<'_>, rates: Rates) {
+        self.record_updates(r, b, rates, false);
+    }
+
+    fn record_updates(&mut self, r: &mut Recording, b: &Batch<'_>, rates: Rates, all: bool) {
+        let p = self.params(b);
+        let floats = self.decoders.floats;
+        let row = (floats - GEOMETRY_FLOATS) as u32;
         let chunks = p.rays.div_ceil(DECODER_CHUNK);
         // (inputs, outputs, activations, deltas, weights, bias)
         let mut layers = vec![
@@ -299,8 +321,10 @@ impl Device {
                 &[t.values, t.gradient, t.moment1, t.moment2, self.status],
             );
         };
-        update(&self.geometry, Some(p.scale_geometry), rates.planes);
-        update(&self.appearance, Some(p.scale_appearance), rates.planes);
+        if all {
+            update(&self.geometry, Some(p.scale_geometry), rates.planes);
+            update(&self.appearance, Some(p.scale_appearance), rates.planes);
+        }
         if self.classes > 0 {
             update(&self.semantic, Some(p.scale_semantic), rates.planes);
         }

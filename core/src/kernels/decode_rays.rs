@@ -32,6 +32,7 @@ kernel! {
             logits_gradient: ReadWrite,
             anchors: Read,
             targets: Read,
+            class_weights: Read,
         ],
     }
 }
@@ -92,6 +93,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
     let (rays, decoders) = (dispatch.read_f32(0), dispatch.read_f32(1));
     let (ray_state, ray_out, logits) = (dispatch.write(2), dispatch.write(3), dispatch.write(4));
     let (anchors, targets) = (dispatch.read_f32(5), dispatch.read_f32(6));
+    let class_weights = dispatch.read_f32(7);
     let surface = surface_weights(decoders);
     let inv_rays = 1.0 / p.rays as f32;
     dispatch.for_each_invocation(|id| {
@@ -149,8 +151,9 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             }
             let mut scale = 0.0;
             if label < p.classes {
-                loss_semantic = sum.ln() + best - own;
-                scale = p.weight_semantic * inv_rays;
+                let weight = class_weights[label as usize];
+                loss_semantic = weight * (sum.ln() + best - own);
+                scale = weight * p.weight_semantic * inv_rays;
             }
             let mut dfeature = [0.0; 16];
             for c in 0..p.classes {

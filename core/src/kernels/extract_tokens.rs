@@ -3,7 +3,7 @@ use super::{
     CpuDispatch, load_f32,
     shared::{Vec3, cross},
     store_f32,
-    tokens::{BANDS, RAW_GEOMETRY, RAW_HISTOGRAM, RAW_MEAN, RAW_PATCH, TokenParams},
+    tokens::{BANDS, RAW_GEOMETRY, RAW_HISTOGRAM, RAW_MEAN, RAW_PATCH, RAW_POINT, TokenParams},
 };
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
@@ -68,8 +68,12 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         }
         (0..3).for_each(|k| put(RAW_MEAN + k as u32, mean[k]));
         let valid = nearest < 1000.0;
-        put(RAW_MEAN + 3, if valid { 1.0 } else { 0.0 });
-        for k in 0..48 {
+        put(RAW_MEAN + 3, 0.0);
+        for k in 0..3 {
+            put(RAW_POINT + k, 0.0);
+        }
+        put(RAW_POINT + 3, if valid { 1.0 } else { 0.0 });
+        for k in 0..RAW_PATCH {
             put(RAW_GEOMETRY + k, 0.0);
         }
         if valid {
@@ -92,6 +96,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                 }
             }
             for k in 0..3 {
+                put(RAW_POINT + k as u32, q[k] + pose[9 + k]);
                 put(RAW_GEOMETRY + 3 + k as u32, world[k] / 8.0 - 0.5);
                 let mut angle = world[k] * (core::f32::consts::PI / 8.0);
                 for band in 0..BANDS {

@@ -143,6 +143,8 @@ registry! {
     pose_step: POSE_STEP,
     /// Single points.
     query_points: QUERY_POINTS,
+    /// The map's features at the tokens.
+    recall_tokens: RECALL_TOKENS,
     /// Column sums.
     reduce_partials: REDUCE_PARTIALS,
     /// Sample placement.

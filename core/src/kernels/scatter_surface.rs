@@ -45,7 +45,8 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         let unlabelled = ray.class() >= p.classes
             && p.weight_compression == 0.0
             && p.weight_feature == 0.0;
-        if ray.masked() || (modality == 1 && unlabelled) {
+        let colourless = modality == 0 && p.weight_color == 0.0;
+        if ray.masked() || colourless || (modality == 1 && unlabelled) {
             return;
         }
         let (scale, state) = if modality == 1 {

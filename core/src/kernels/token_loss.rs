@@ -5,7 +5,7 @@ use super::{
     load_f32,
     shared::{class_logit, head_row},
     store_f32,
-    tokens::{COLOR_AT, FUSED_AT, LOGITS_AT, RAW_HISTOGRAM, RAW_MEAN, TokenParams, sixteen},
+    tokens::{COLOR_AT, FUSED_AT, LOGITS_AT, RAW_HISTOGRAM, RAW_MEAN, RAW_POINT, TokenParams, sixteen},
 };
 use crate::layout::TARGET_FLOATS;
 #[cfg(not(feature = "std"))]
@@ -44,12 +44,14 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         let raw = &raw[token * p.raw_stride as usize..(token + 1) * p.raw_stride as usize];
         let histogram = &raw[RAW_HISTOGRAM as usize..];
         let feature = sixteen(tokens, row + FUSED_AT as usize);
-        let valid = raw[RAW_MEAN as usize + 3];
+        let valid = raw[RAW_POINT as usize + 3];
         let out = &targets[(p.slot as usize * p.tokens() + token) * TARGET_FLOATS..];
         for (c, f) in feature.iter().enumerate() {
             store_f32(&out[c], *f);
         }
-        store_f32(&out[16], valid);
+        // A patch across a boundary has no feature that fits all its pixels.
+        let share = histogram[..p.classes as usize].iter().fold(0.0_f32, |a, b| a.max(*b));
+        store_f32(&out[16], valid * (2.0 * share - 1.0).max(0.0));
         (17..20).for_each(|k| store_f32(&out[k], 0.0));
         if p.train == 0 {
             return;

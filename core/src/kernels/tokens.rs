@@ -2,8 +2,9 @@
 use super::load_f32;
 use core::sync::atomic::AtomicU32;
 
-/// Floats of the geometry encoding: normal (3), position (3), sines and cosines of 7 bands (42).
-pub const GEOMETRY_INPUTS: u32 = 48;
+/// Floats of the geometry encoding: normal (3), position (3), sines and cosines of 7 bands (42),
+/// and what the map holds at the point: its semantic feature (16).
+pub const GEOMETRY_INPUTS: u32 = 64;
 /// Bands of the positional encoding; wavelengths of 16 m, 8 m .. 0.25 m.
 pub const BANDS: u32 = 7;
 /// Floats of a patch: 8 x 8 colours.
@@ -18,12 +19,16 @@ pub const TILE: usize = 64;
 // Columns of a token's raw inputs.
 /// Geometry encoding.
 pub const RAW_GEOMETRY: u32 = 0;
+/// The map's semantic feature at the token's point.
+pub const RAW_MEMORY: u32 = 48;
 /// Colours of the patch, less one half.
-pub const RAW_PATCH: u32 = 48;
-/// Mean colour (3), 1 where the token has geometry.
-pub const RAW_MEAN: u32 = 240;
+pub const RAW_PATCH: u32 = 64;
+/// Mean colour (3), 0.
+pub const RAW_MEAN: u32 = 256;
+/// World position (3) \[m\], 1 where the token has geometry.
+pub const RAW_POINT: u32 = 260;
 /// Share of the patch's pixels with each class.
-pub const RAW_HISTOGRAM: u32 = 244;
+pub const RAW_HISTOGRAM: u32 = 264;
 
 // Columns of a token's activations (and of their gradients).
 /// Hidden layer of the geometry embedding.

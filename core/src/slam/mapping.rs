@@ -20,8 +20,23 @@ const OBSERVATION_WIDTH: u32 = 160;
 const ITERATIONS_PER_RECORDING: u32 = 4;
 /// Joint pose refinement needs more keyframes than this (NICE-SLAM).
 const REFINE_AFTER: usize = 4;
+/// Stratified samples a ray when semantics are trained alone.
+const SEMANTIC_STRATIFIED: u32 = 4;
 /// Keyframes that every window holds while frames come in: the current one and the two before.
 const RECENT: usize = 3;
+
+/// One call of the optimisation.
+#[derive(Clone, Copy)]
+struct Pass {
+    iterations: u32,
+    rates: Rates,
+    /// Keyframes that every window holds, counted from the last.
+    recent: usize,
+    /// Training steps of the fusion, spread over the iterations.
+    fusion_steps: u32,
+    /// Train the semantics alone; the rest of the map stays as it is.
+    semantic: bool,
+}
 
 /// By how much the kept depth images are smaller.
 pub(super) fn observation_step(width: u32) -> u32 {
@@ -71,11 +86,12 @@ impl Slam {
             });
         };
         self.class_counts.add(self.info.classes.len(), frame);
-        let class_weights = self.class_counts.weights(self.config.fusion.balance);
+        let ray_weights = self.class_counts.weights(self.config.loss.balance);
+        let token_weights = self.class_counts.weights(self.config.fusion.balance);
         let device = self.device()?;
         let mut r = Recording::default();
         device.upload_frame(&mut r, slot, frame);
-        device.upload_class_weights(&mut r, &class_weights);
+        device.upload_class_weights(&mut r, &ray_weights, &token_weights);
         device.engine.submit(&r)?;
 
         let first = self.keyframes.is_empty();
@@ -102,7 +118,12 @@ impl Slam {
         let rates = Rates { planes: m.rate_planes * factor, decoders: m.rate_decoders * factor };
         let f = &self.config.fusion;
         let steps = if first { f.first_steps } else { f.steps };
-        let losses = self.optimise(iterations, rates, &near, RECENT, steps).await?;
+        let losses = self
+            .optimise(
+                &near,
+                Pass { iterations, rates, recent: RECENT, fusion_steps: steps, semantic: false },
+            )
+            .await?;
         self.mapping_calls += 1;
         if !keyframe && let Some(k) = self.keyframes.pop() {
             self.free_slots.push(k.slot);
@@ -121,15 +142,22 @@ impl Slam {
         self.follow_odometer();
         let m = self.config.mapping.clone();
         let all: Vec<usize> = (0..self.keyframes.len()).collect();
-        let mut left = m.final_iterations;
-        while left > 0 {
-            let n = left.min(20);
-            let factor = 0.1 + 0.9 * f64::from(left) / f64::from(m.final_iterations);
-            let rates =
-                Rates { planes: m.rate_planes * factor, decoders: m.rate_decoders * factor };
-            let steps = self.config.fusion.steps * n / m.iterations.max(1);
-            self.optimise(n, rates, &all, 0, steps).await?;
-            left -= n;
+        for (total, semantic) in [
+            (m.final_iterations, false),
+            (if self.info.classes.is_empty() { 0 } else { m.semantic_iterations }, true),
+        ] {
+            let mut left = total;
+            while left > 0 {
+                let iterations = left.min(20);
+                let factor = 0.1 + 0.9 * f64::from(left) / f64::from(total);
+                let rates =
+                    Rates { planes: m.rate_planes * factor, decoders: m.rate_decoders * factor };
+                let fusion_steps = self.config.fusion.steps * iterations / m.iterations.max(1);
+                let fusion_steps = if semantic { fusion_steps / 4 } else { fusion_steps };
+                let pass = Pass { iterations, rates, recent: 0, fusion_steps, semantic };
+                self.optimise(&all, pass).await?;
+                left -= iterations;
+            }
         }
         self.follow_odometer();
         Ok(())
@@ -188,20 +216,18 @@ impl Slam {
 
     /// Optimises map and poses over windows of the `recent` last keyframes (the current frame
     /// among them) and others drawn from the keyframes `near`.
-    async fn optimise(
-        &mut self,
-        iterations: u32,
-        rates: Rates,
-        near: &[usize],
-        recent: usize,
-        fusion_steps: u32,
-    ) -> Result<Losses, SlamError> {
+    async fn optimise(&mut self, near: &[usize], pass: Pass) -> Result<Losses, SlamError> {
+        let Pass { iterations, rates, recent, fusion_steps, semantic } = pass;
         let m = self.config.mapping.clone();
         let s = self.config.sampling.clone();
-        let loss = self.config.loss.clone();
+        let mut loss = self.config.loss.clone();
+        if semantic {
+            loss.color = 0.0;
+        }
         let seed = self.config.seed;
         let n = self.keyframes.len();
-        let refine = n > REFINE_AFTER
+        let refine = !semantic
+            && n > REFINE_AFTER
             && match (m.refine_poses, self.config.tracking.tracker) {
                 (_, Tracker::Truth) | (RefinePoses::Off, _) => false,
                 (RefinePoses::On, _) => true,
@@ -213,8 +239,11 @@ impl Slam {
         let first_iteration = self.iteration;
         self.iteration += iterations;
         let last_frame = self.keyframes.last().map_or(0, |k| k.frame);
-        let compression = self.compression(&self.config.suppressor);
-        let feature = self.feature(&self.config.fusion);
+        let (compression, feature) = if semantic {
+            (self.config.suppressor.final_weight, self.config.fusion.final_weight)
+        } else {
+            (self.compression(&self.config.suppressor), self.feature(&self.config.fusion))
+        };
         let device = self.device()?;
         let mut touched = BTreeSet::new();
         let mut r = Recording::default();
@@ -257,7 +286,8 @@ impl Slam {
             let batch = Batch {
                 frames,
                 rays_per_frame: m.rays / frames,
-                stratified: s.stratified,
+                // Semantics sit on the surface: the samples around it carry them.
+                stratified: if semantic { SEMANTIC_STRATIFIED } else { s.stratified },
                 surface: s.surface,
                 flags: FLAG_GUIDED | FLAG_MAP | if refine { FLAG_POSE } else { 0 },
                 loss: &loss,
@@ -272,12 +302,17 @@ impl Slam {
             if i + 1 == iterations {
                 device.record_anchor_maintenance(&mut r, &batch);
             }
-            device.record_backward(&mut r, &batch);
-            if refine {
-                let (v, w) = (m.rate_translation_m, m.rate_rotation_rad);
-                device.record_pose_step(&mut r, &batch, v, w, false);
+            if semantic {
+                device.record_semantic_backward(&mut r, &batch);
+                device.record_semantic_step(&mut r, &batch, rates);
+            } else {
+                device.record_backward(&mut r, &batch);
+                if refine {
+                    let (v, w) = (m.rate_translation_m, m.rate_rotation_rad);
+                    device.record_pose_step(&mut r, &batch, v, w, false);
+                }
+                device.record_step(&mut r, &batch, rates);
             }
-            device.record_step(&mut r, &batch, rates);
             if (i + 1) % ITERATIONS_PER_RECORDING == 0 || i + 1 == iterations {
                 device.engine.submit(&r)?;
                 r = Recording::default();
