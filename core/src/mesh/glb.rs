@@ -26,7 +26,9 @@ const UNLIT: &str = "KHR_materials_unlit";
 /// # Errors
 /// A mesh that fails [`Mesh::check`] or has non-finite positions, or 4 GiB of data.
 pub fn write_glb(mesh: &Mesh) -> Result<Vec<u8>, MeshError> {
-    let mut glb = Glb::with_vertices(mesh, true)?;
+    mesh.check()?;
+    let mut glb = Glb::default();
+    glb.add_vertices(mesh, true)?;
     // The colours are as photographed, lighting included: viewers that can show them unlit.
     let material = r#"{"name":"vertex colours","doubleSided":true,"pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":1},"extensions":{"KHR_materials_unlit":{}}}"#;
     let indices: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
@@ -40,10 +42,11 @@ pub fn write_glb(mesh: &Mesh) -> Result<Vec<u8>, MeshError> {
 /// # Errors
 /// As [`write_glb`], or a mesh without classes.
 pub fn write_glb_by_class(mesh: &Mesh, classes: &ClassTable) -> Result<Vec<u8>, MeshError> {
-    let mut glb = Glb::with_vertices(mesh, false)?;
+    mesh.check()?;
     if mesh.classes.len() != mesh.positions.len() {
         return Err(invalid("classes of the mesh", "none", "one a vertex"));
     }
+    let mut glb = Glb::default();
     let mut by_class: BTreeMap<u8, Vec<u32>> = BTreeMap::new();
     for t in &mesh.triangles {
         let [a, b, c] = t.map(|i| mesh.classes[i as usize]);
@@ -59,9 +62,29 @@ pub fn write_glb_by_class(mesh: &Mesh, classes: &ClassTable) -> Result<Vec<u8>, 
             r#"{{"name":{},"doubleSided":true,"pbrMetallicRoughness":{{"baseColorFactor":[{r},{g},{b},1],"metallicFactor":0,"roughnessFactor":1}}}}"#,
             quoted(name)
         );
+        // Vertices of its own: viewers that copy those of each primitive would copy all of them.
+        let (part, indices) = part_of(mesh, &indices);
+        glb.add_vertices(&part, false)?;
         glb.add_primitive(&indices, &material);
     }
     glb.finish()
+}
+
+/// The vertices that the corners of some triangles use, and the corners' indices among them.
+fn part_of(mesh: &Mesh, corners: &[u32]) -> (Mesh, Vec<u32>) {
+    let mut part = Mesh::default();
+    let mut place = BTreeMap::new();
+    let indices = corners
+        .iter()
+        .map(|&i| {
+            *place.entry(i).or_insert_with(|| {
+                part.positions.push(mesh.positions[i as usize]);
+                part.normals.extend(mesh.normals.get(i as usize));
+                part.positions.len() as u32 - 1
+            })
+        })
+        .collect();
+    (part, indices)
 }
 
 fn invalid(what: &'static str, found: impl ToString, expected: &str) -> MeshError {
@@ -103,12 +126,11 @@ struct Glb {
 }
 
 impl Glb {
-    fn with_vertices(mesh: &Mesh, colors: bool) -> Result<Glb, MeshError> {
-        mesh.check()?;
-        let mut glb = Glb::default();
+    /// Vertices of the primitives added from now on.
+    fn add_vertices(&mut self, mesh: &Mesh, colors: bool) -> Result<(), MeshError> {
         let n = mesh.positions.len();
         if n == 0 {
-            return Ok(glb);
+            return Ok(());
         }
         let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
         for p in &mesh.positions {
@@ -121,13 +143,13 @@ impl Glb {
         }
         let bounds = format!(r#","min":{low:?},"max":{high:?}"#);
         let data = bytemuck::cast_slice(&mesh.positions);
-        let position = glb.accessor(data, VERTICES, F32, "VEC3", n, &bounds);
-        glb.attributes = format!(r#""POSITION":{position}"#);
+        let position = self.accessor(data, VERTICES, F32, "VEC3", n, &bounds);
+        self.attributes = format!(r#""POSITION":{position}"#);
         if !mesh.normals.is_empty() {
             // The format asks for unit normals; an undefined one gets any direction.
             let unit: Vec<[f32; 3]> = mesh.normals.iter().map(|&v| unit_or_z(v)).collect();
-            let normal = glb.accessor(bytemuck::cast_slice(&unit), VERTICES, F32, "VEC3", n, "");
-            glb.attributes += &format!(r#","NORMAL":{normal}"#);
+            let normal = self.accessor(bytemuck::cast_slice(&unit), VERTICES, F32, "VEC3", n, "");
+            self.attributes += &format!(r#","NORMAL":{normal}"#);
         }
         if colors && !mesh.colors.is_empty() {
             let table: Vec<u16> = (0..=255).map(|s| (linear(s) * 65535.0 + 0.5) as u16).collect();
@@ -137,10 +159,10 @@ impl Glb {
                 .map(|c| [table[c[0] as usize], table[c[1] as usize], table[c[2] as usize], 65535])
                 .collect();
             let data = bytemuck::cast_slice(&rgba);
-            let color = glb.accessor(data, VERTICES, U16, "VEC4", n, r#","normalized":true"#);
-            glb.attributes += &format!(r#","COLOR_0":{color}"#);
+            let color = self.accessor(data, VERTICES, U16, "VEC4", n, r#","normalized":true"#);
+            self.attributes += &format!(r#","COLOR_0":{color}"#);
         }
-        Ok(glb)
+        Ok(())
     }
 
     /// Append data (a multiple of 4 bytes), and describe it. Returns the accessor's index.
@@ -276,6 +298,15 @@ mod tests {
         assert!(json.contains(r#""name":"a \"chair\"\u000a""#) && json.contains("wall"));
         assert!(json.contains("unlabelled") && !json.contains("COLOR_0"));
         assert_eq!(json.matches("\"indices\"").count(), 3);
+        // Each primitive has the vertices that it uses, not all 9: 5 of class 0, 7 of 1, 5 of none.
+        let json: serde_json::Value = serde_json::from_str(json).unwrap();
+        let primitives = json["meshes"][0]["primitives"].as_array().unwrap();
+        let vertices: Vec<u64> = primitives
+            .iter()
+            .map(|p| p["attributes"]["POSITION"].as_u64().unwrap() as usize)
+            .map(|i| json["accessors"][i]["count"].as_u64().unwrap())
+            .collect();
+        assert_eq!(vertices, [5, 7, 5]);
         assert!(write_glb_by_class(&square(1, 1.0, 0.0), &table).is_err());
     }
 

@@ -72,8 +72,8 @@ pub fn confusion(table: &ClassTable, matrix: &ConfusionMatrix) -> Result<Vec<u8>
     }
     let name = |c: usize| table.classes.get(c).map_or("(no class)".to_owned(), |c| cut(&c.name));
     // Large enough for three digits, unless there are very many.
-    let cell = (1800 / columns.len().max(1)).clamp(14, 44);
-    let text = if cell >= 30 { ZOOM } else { 1 };
+    let cell = (1800 / columns.len().max(1)).clamp(14, 52);
+    let text = if cell >= 36 { ZOOM } else { 1 };
     let digit = text * 8;
     let shares: Vec<String> =
         rows.iter().map(|&t| share_text(of_truth(t), &rows, of_truth)).collect();
@@ -86,8 +86,8 @@ pub fn confusion(table: &ClassTable, matrix: &ConfusionMatrix) -> Result<Vec<u8>
     let mut canvas = Canvas::new(width, height, PAPER);
     let title = "Confusion: row = true class, column = rendered class";
     canvas.text(MARGIN, MARGIN, ZOOM, INK, title);
-    let note = "% of the row's pixels (1 to 100); beside a row its share of all";
-    canvas.text(MARGIN, MARGIN + GLYPH + 6, 1, FAINT, note);
+    let note = "% of the row's pixels; beside its name, the class's share";
+    canvas.text(MARGIN, MARGIN + GLYPH + 6, ZOOM, FAINT, note);
     for (i, &c) in columns.iter().enumerate() {
         let x = left + i * cell;
         canvas.text_up(x + (cell - digit) / 2, top - 6, text, INK, &name(c));

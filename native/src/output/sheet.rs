@@ -149,7 +149,7 @@ pub fn sheet(sheet: &Sheet) -> Result<Vec<u8>> {
                         (false, true) => Some(MENDED),
                         _ => None,
                     });
-                panel(3, 2, "input -> rendered: mended (green), spoilt (red)", &image);
+                panel(3, 2, "mended (green), spoilt (red)", &image);
             }
         }
     }
