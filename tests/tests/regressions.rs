@@ -5,10 +5,11 @@ use mte_slam_core::{
     engine::Engine,
     kernels::{
         adam::{ADAM, AdamParams},
+        composite::COMPOSITE,
         composite_backward::COMPOSITE_BACKWARD,
         shared::{FLAG_DENSE, FLAG_GUIDED, FLAG_MAP, FLAG_MASK, FLAG_POSE, Grid, plane_corners},
     },
-    layout::CHANNELS,
+    layout::{CHANNELS, RAY_STATE_FLOATS, STATE_DEPTH},
     recording::Recording,
 };
 use mte_slam_tests::{
@@ -120,6 +121,38 @@ fn importance_samples_follow_the_trained_distance() {
             let hits = out.chunks(12).filter(|r| (r[3] - 0.4 - wall_m).abs() < 0.03).count();
             let rays = state.params.rays as usize;
             assert!(hits * 10 > rays * 9, "{wall_m}: {hits} of {rays} rays render the wall");
+        }
+    }
+}
+
+/// A view's ray that meets the edge of a surface, which takes 60 % of its light, and a wall behind
+/// shows the edge's depth; training goes by the mean of both.
+#[test]
+fn views_show_no_depth_between_an_edge_and_what_is_behind() {
+    for mut engine in engines() {
+        for (flags, view) in [(FLAG_DENSE, true), (FLAG_GUIDED | FLAG_MAP, false)] {
+            let mut state = State::new(&Options { flags, ..Options::default() });
+            state.forward(&mut engine);
+            let (n, rays) = (state.params.samples as usize, state.params.rays as usize);
+            let edge = (0.4_f32 / 0.6).ln() / state.params.sharpness;
+            let distance = |i: usize| match i {
+                5 => edge,
+                11.. => -1.0,
+                _ => 1.0,
+            };
+            let each =
+                |value: &dyn Fn(usize) -> f32| f32_words((0..rays * n).map(|i| value(i % n)));
+            state.buffers.insert("distances", each(&distance));
+            state.buffers.insert("depths", each(&|i| 0.1 * i as f32));
+            state.run(&mut engine, &COMPOSITE);
+            let out = state.floats("ray_state");
+            for (i, ray) in out.chunks(RAY_STATE_FLOATS).enumerate() {
+                let at = STATE_DEPTH as usize * 4;
+                let (depth, opacity) = (ray[at], ray[at + 1]);
+                assert!((opacity - 1.0).abs() < 1e-3, "ray {i}: {opacity}");
+                let expected = if view { 0.4 + 0.1 * 0.5 / 0.6 } else { 0.6 * 0.45 + 0.4 * 1.05 };
+                assert!((depth - expected).abs() < 2e-3, "ray {i}: {depth}, not {expected}");
+            }
         }
     }
 }
