@@ -51,6 +51,21 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
         phi0 = phi1;
     }
     weights[base + params.samples - 1u] = 0.0;
+    // Views show the depth that half of the light reaches: a mean over the edge of a surface would lie in the air
+    // between it and what is behind.
+    if ((params.flags & (FLAG_DENSE | FLAG_MAP | FLAG_POSE)) == FLAG_DENSE) {
+        var before = 0.0;
+        var k = 1u;
+        var w = weights[base];
+        while (k + 1u < params.samples && before + w < 0.5 * opacity) {
+            before += w;
+            w = weights[base + k];
+            k++;
+        }
+        let t = clamp((0.5 * opacity - before) / max(w, 1e-12), 0.0, 1.0);
+        let z = depths[base + k - 1u];
+        depth = opacity * (z + t * (depths[base + k] - z));
+    }
     // A loop of its own over the intervals that count: machines that run both sides of a branch, as lavapipe,
     // pay for every pass through a loop's body.
     var i = min(first, last);

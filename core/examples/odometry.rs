@@ -1,281 +1,221 @@
-//! Trajectory error of the odometry alone on the development sequences.
+//! Trajectory error of the odometry alone on the recordings below a folder.
 //!
-//! `odometry DATA_FOLDER [key=value ...]`, where a key is a path into [`OdometryConfig`] such as
-//! `references=2` or `align.max_points=20000`, or `only=room-11`, `frames=40`, `out=FOLDER`.
-use glam::{DMat3, DQuat, DVec3};
+//! `odometry FOLDER [key=value ...]`: every folder in FOLDER that is a recording (see
+//! `mte_slam_core::dataset`). A key is a path into [`OdometryConfig`] such as `references=2` or
+//! `align.max_points=20000`, or one of `only=room` (part of the name), `frames=40`, `scale=0.5` (by
+//! default images wider than 400 pixels are halved), `verbose=1`, `out=FOLDER`.
 use mte_slam_core::{
-    camera::Camera,
-    frame::Frame,
+    dataset::{self, LabelSource, OpenOptions},
+    metrics::{PosePair, ate},
     pose::Pose,
+    sequence::{Sequence, SequenceError, Source},
     track::odometry::{Odometer, OdometryConfig, RgbdPyramid},
 };
 use std::{
+    error::Error,
     fmt::Write as _,
     fs,
     path::{Path, PathBuf},
     time::Instant,
 };
 
-struct Recording {
-    camera: Camera,
-    unit_m: f64,
-    frames: Vec<(String, String, Pose)>,
-    invalid: u16,
-    step: u32,
+/// The files of a folder and of the folders in it.
+struct Files {
+    name: String,
+    root: PathBuf,
 }
 
-fn numbers(text: &str) -> Vec<f64> {
-    text.split_whitespace().filter_map(|t| t.parse().ok()).collect()
-}
+impl Source for Files {
+    fn name(&self) -> &str {
+        &self.name
+    }
 
-fn open(folder: &Path) -> Option<Recording> {
-    let name = |n: &str| folder.join(n).to_string_lossy().into_owned();
-    let read = |n: &str| fs::read_to_string(folder.join(n)).ok();
-    if let Some(text) = read("traj.txt") {
-        let camera = Camera {
-            width: 320,
-            height: 240,
-            fx: 208.5160596545929,
-            fy: 208.5160596545929,
-            cx: 159.5,
-            cy: 119.5,
+    fn list(&self) -> Result<Vec<String>, SequenceError> {
+        let failed = |e: std::io::Error| SequenceError::Read {
+            file: self.name.clone(),
+            reason: e.to_string(),
         };
-        let frames = text
-            .lines()
-            .enumerate()
-            .filter_map(|(i, l)| {
-                let m: [f64; 16] = numbers(l).try_into().ok()?;
-                Some((
-                    name(&format!("results/frame{i:06}.jpg")),
-                    name(&format!("results/depth{i:06}.png")),
-                    Pose::from_row_major(&m)?,
-                ))
-            })
-            .collect();
-        return Some(Recording { camera, unit_m: 1.0 / 6553.5, frames, invalid: 0, step: 1 });
-    }
-    if let Some(text) = read("groundtruth.txt") {
-        let camera = Camera { width: 640, height: 480, fx: 535.4, fy: 539.2, cx: 320.1, cy: 247.6 };
-        let list = |t: String| {
-            t.lines()
-                .filter(|l| !l.starts_with('#'))
-                .map(|l| l.split_whitespace().map(String::from).collect::<Vec<_>>())
-                .collect::<Vec<_>>()
-        };
-        let (rgb, depth) = (list(read("rgb.txt")?), list(read("depth.txt")?));
-        let truth = list(text);
-        let frames = rgb
-            .iter()
-            .zip(&depth)
-            .zip(&truth)
-            .filter(|((c, d), t)| c[0] == d[0] && c[0] == t[0])
-            .map(|((c, d), t)| {
-                let x: Vec<f64> = t.iter().map(|s| s.parse().unwrap_or(f64::NAN)).collect();
-                let pose = Pose::from_quaternion(
-                    DVec3::new(x[1], x[2], x[3]),
-                    DQuat::from_xyzw(x[4], x[5], x[6], x[7]),
-                );
-                (name(&c[1]), name(&d[1]), pose)
-            })
-            .collect();
-        return Some(Recording { camera, unit_m: 1.0 / 5000.0, frames, invalid: 0, step: 2 });
-    }
-    let camera = Camera { width: 640, height: 480, fx: 585.0, fy: 585.0, cx: 320.0, cy: 240.0 };
-    let mut frames = Vec::new();
-    while let Some(text) = read(&format!("frame-{:06}.pose.txt", frames.len())) {
-        let i = frames.len();
-        let m: [f64; 16] = numbers(&text).try_into().ok()?;
-        frames.push((
-            name(&format!("frame-{i:06}.color.jpg")),
-            name(&format!("frame-{i:06}.depth.png")),
-            Pose::from_row_major(&m)?,
-        ));
-    }
-    Some(Recording { camera, unit_m: 1e-3, frames, invalid: 65535, step: 2 })
-}
-
-fn load(r: &Recording, i: usize) -> Frame {
-    let (color, depth, truth) = &r.frames[i];
-    let color = image::open(color).expect(color).to_rgb8();
-    let depth = image::open(depth).expect(depth).to_luma16();
-    let (w, h) = (color.width() / r.step, color.height() / r.step);
-    let s = r.step;
-    let mut frame = Frame {
-        index: i,
-        number: i as u64,
-        time_s: i as f64,
-        color: Vec::new(),
-        depth: Vec::new(),
-        labels: None,
-        truth: Some(*truth),
-    };
-    for v in 0..h {
-        for u in 0..w {
-            let mut c = [0u32; 3];
-            let mut z = [0u16; 4];
-            for k in 0..s * s {
-                let (x, y) = (u * s + k % s, v * s + k / s);
-                for j in 0..3 {
-                    c[j] += u32::from(color.get_pixel(x, y)[j]);
+        let mut files = Vec::new();
+        let mut folders = vec![String::new()];
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(self.root.join(&folder)).map_err(failed)? {
+                let entry = entry.map_err(failed)?;
+                let name = format!("{folder}{}", entry.file_name().to_string_lossy());
+                if entry.file_type().map_err(failed)?.is_dir() {
+                    folders.push(name + "/");
+                } else {
+                    files.push(name);
                 }
-                let d = depth.get_pixel(x, y)[0];
-                z[k as usize] = if d == r.invalid { 0 } else { d };
             }
-            frame.color.push(c.map(|x| ((x + s * s / 2) / (s * s)) as u8));
-            // Nearest neighbour: the top left of the middle four.
-            let mut d = z[0];
-            if s == 2 {
-                let mut valid: Vec<u16> = z.iter().copied().filter(|&d| d > 0).collect();
-                valid.sort_unstable();
-                d = if valid.is_empty() { 0 } else { valid[valid.len() / 2] };
-            }
-            frame.depth.push(d);
         }
+        Ok(files)
     }
-    frame
+
+    fn read(&self, file: &str) -> Result<Vec<u8>, SequenceError> {
+        fs::read(self.root.join(file))
+            .map_err(|e| SequenceError::Read { file: file.into(), reason: e.to_string() })
+    }
 }
 
-/// RMSE and maximum of translation after the best SE(3) alignment (Horn) \[m\].
-fn ate(estimate: &[DVec3], truth: &[DVec3]) -> (f64, f64) {
-    let n = estimate.len() as f64;
-    let ce = estimate.iter().sum::<DVec3>() / n;
-    let ct = truth.iter().sum::<DVec3>() / n;
-    let mut s = [[0.0; 3]; 3];
-    for (e, t) in estimate.iter().zip(truth) {
-        let (e, t) = ((*e - ce).to_array(), (*t - ct).to_array());
-        for i in 0..3 {
-            for j in 0..3 {
-                s[i][j] += e[i] * t[j];
-            }
-        }
-    }
-    let m = [
-        [s[0][0] + s[1][1] + s[2][2], s[1][2] - s[2][1], s[2][0] - s[0][2], s[0][1] - s[1][0]],
-        [s[1][2] - s[2][1], s[0][0] - s[1][1] - s[2][2], s[0][1] + s[1][0], s[2][0] + s[0][2]],
-        [s[2][0] - s[0][2], s[0][1] + s[1][0], s[1][1] - s[0][0] - s[2][2], s[1][2] + s[2][1]],
-        [s[0][1] - s[1][0], s[2][0] + s[0][2], s[1][2] + s[2][1], s[2][2] - s[0][0] - s[1][1]],
-    ];
-    // Largest eigenvector by power iteration on a shifted matrix.
-    let shift: f64 = m.iter().flatten().map(|x| x.abs()).sum();
-    let mut q = [1.0, 0.01, 0.02, 0.03];
-    for _ in 0..20000 {
-        let mut p = [0.0; 4];
-        for i in 0..4 {
-            p[i] = shift * q[i] + (0..4).map(|j| m[i][j] * q[j]).sum::<f64>();
-        }
-        let l = p.iter().map(|x| x * x).sum::<f64>().sqrt();
-        q = p.map(|x| x / l);
-    }
-    let r = DMat3::from_quat(DQuat::from_xyzw(q[1], q[2], q[3], q[0]).normalize());
-    let errors: Vec<f64> =
-        estimate.iter().zip(truth).map(|(e, t)| (r * (*e - ce) - (*t - ct)).length()).collect();
-    let rmse = (errors.iter().map(|e| e * e).sum::<f64>() / n).sqrt();
-    (rmse, errors.iter().copied().fold(0.0, f64::max))
+fn open(
+    root: &Path,
+    frames: Option<usize>,
+    scale: f64,
+) -> Result<Box<dyn Sequence>, SequenceError> {
+    let files = Files { name: root.display().to_string(), root: root.into() };
+    let labels = LabelSource::None;
+    dataset::open(Box::new(files), OpenOptions { frames, scale, labels, ..OpenOptions::default() })
 }
 
-fn main() {
-    let mut args = std::env::args().skip(1);
-    let Some(data) = args.next() else {
-        eprintln!("usage: odometry DATA_FOLDER [key=value ...]");
-        return;
+struct Options {
+    only: String,
+    frames: Option<usize>,
+    scale: Option<f64>,
+    verbose: bool,
+    out: Option<PathBuf>,
+    odometry: OdometryConfig,
+}
+
+fn options(args: impl Iterator<Item = String>) -> Result<Options, Box<dyn Error>> {
+    let mut config = serde_json::to_value(OdometryConfig::default())?;
+    let mut options = Options {
+        only: String::new(),
+        frames: None,
+        scale: None,
+        verbose: false,
+        out: None,
+        odometry: OdometryConfig::default(),
     };
-    let mut config = serde_json::to_value(OdometryConfig::default()).expect("config");
-    let (mut only, mut most, mut verbose, mut out) = (String::new(), usize::MAX, false, None);
     for arg in args {
-        let (key, value) = arg.split_once('=').expect("key=value");
+        let (key, value) = arg.split_once('=').ok_or_else(|| format!("{arg}: not key=value"))?;
         match key {
-            "only" => only = value.into(),
-            "frames" => most = value.parse().expect("frames"),
-            "verbose" => verbose = value == "1",
-            "out" => out = Some(PathBuf::from(value)),
+            "only" => options.only = value.into(),
+            "frames" => options.frames = Some(value.parse()?),
+            "scale" => options.scale = Some(value.parse()?),
+            "verbose" => options.verbose = value == "1",
+            "out" => options.out = Some(PathBuf::from(value)),
             _ => {
                 let mut at = &mut config;
                 for part in key.split('.') {
-                    at = at.get_mut(part).unwrap_or_else(|| panic!("no setting {key}"));
+                    at = at.get_mut(part).ok_or_else(|| format!("no setting {key}"))?;
                 }
-                *at = serde_json::from_str(value).expect("a JSON value");
+                *at = serde_json::from_str(value)?;
             }
         }
     }
-    let config: OdometryConfig = serde_json::from_value(config).expect("config");
+    options.odometry = serde_json::from_value(config)?;
+    Ok(options)
+}
+
+/// Track one recording and print its line of the table.
+fn measure(name: &str, mut sequence: Box<dyn Sequence>, o: &Options) -> Result<(), Box<dyn Error>> {
+    let info = sequence.info().clone();
+    let mut odometer = Odometer::new(o.odometry.clone());
+    let mut online: Vec<Pose> = Vec::new();
+    let (mut seconds, mut prepare, mut lost, mut recovered) = (0.0, 0.0, 0, 0);
+    for i in 0..info.frames {
+        let frame = sequence.frame(i)?;
+        let first = if i == 0 { frame.truth } else { None };
+        let start = Instant::now();
+        let unit = info.depth_unit_m;
+        let pyramid = RgbdPyramid::new(&frame, &info.camera, unit, &o.odometry.pyramid)?;
+        prepare += start.elapsed().as_secs_f64();
+        let result = odometer.track(pyramid, first)?;
+        seconds += start.elapsed().as_secs_f64();
+        lost += usize::from(result.lost);
+        recovered += usize::from(result.recovered);
+        online.push(result.world_from_camera);
+        if let (true, Some(truth)) = (o.verbose, frame.truth) {
+            let q = result.quality;
+            let e = truth.inverse().compose(&result.world_from_camera);
+            let step = |from: Option<Pose>, to: Pose| {
+                from.map_or(0.0, |p| 100.0 * (to.translation - p.translation).length())
+            };
+            let before = i.checked_sub(1);
+            println!(
+                "{i:4} step {:.2} {:.2} cm err {:6.2} cm {:5.2} deg  inl {:.2} ovl {:.2} g {:.2} mm p {:.4} cond {:.1e} refs {} {} {}",
+                step(before.and_then(|j| sequence.truth(j)), truth),
+                step(before.map(|j| online[j]), online[i]),
+                100.0 * e.translation.length(),
+                e.angle_rad().to_degrees(),
+                q.inlier_ratio,
+                q.overlap,
+                1e3 * q.geometric_rmse_m,
+                q.photometric_rmse,
+                q.conditioning,
+                q.references,
+                if result.keyframe.is_some() { "K" } else { "" },
+                result.reason.map_or(String::new(), |r| format!("{r:?}")),
+            );
+        }
+    }
+    let last: Vec<Pose> = odometer.trajectory().iter().map(|t| t.1).collect();
+    if let Some(out) = &o.out {
+        // A line a frame: estimate, then truth, both `world_from_camera`, 3x4 row by row.
+        let mut text = String::new();
+        for (i, estimate) in last.iter().enumerate() {
+            let Some(truth) = sequence.truth(i) else { continue };
+            for x in [*estimate, truth].iter().flat_map(|p| p.to_row_major()[..12].to_vec()) {
+                write!(text, "{x} ")?;
+            }
+            text.push('\n');
+        }
+        fs::write(out.join(format!("{name}.txt")), text)?;
+    }
+    if o.verbose {
+        println!("colour registration {:?}", odometer.colour_registration());
+    }
+    let error = |poses: &[Pose]| {
+        let pairs: Vec<PosePair> = (poses.iter().enumerate())
+            .filter_map(|(i, p)| Some(PosePair { estimate: *p, truth: sequence.truth(i)? }))
+            .collect();
+        ate(&pairs)
+    };
+    let (after, during) = (error(&last)?.aligned_cm, error(&online)?.aligned_cm);
+    let per_frame = 1e3 / info.frames.max(1) as f64;
     println!(
-        "| sequence | frames | ATE cm | online cm | max cm | ms/frame | pyramid ms | lost | recovered | keyframes |"
+        "| {name} | {} | {:.3} | {:.3} | {:.3} | {:.1} | {:.1} | {lost} | {recovered} | {} | {:.3} |",
+        info.frames,
+        after.rmse,
+        during.rmse,
+        after.max,
+        per_frame * seconds,
+        per_frame * prepare,
+        odometer.keyframes().len(),
+        odometer.colour_registration().scale,
     );
-    for name in ["kitchen-7scenes", "room-11", "office-12", "cabinet-tum"] {
-        if !only.is_empty() && !name.contains(&only) {
+    Ok(())
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut args = std::env::args().skip(1);
+    let Some(data) = args.next() else {
+        return Err("usage: odometry FOLDER [key=value ...]".into());
+    };
+    let options = options(args)?;
+    let mut folders: Vec<PathBuf> =
+        fs::read_dir(&data)?.map(|e| Ok(e?.path())).collect::<Result<_, std::io::Error>>()?;
+    folders.retain(|f| f.is_dir());
+    folders.sort();
+    println!(
+        "| sequence | frames | ATE cm | online cm | max cm | ms/frame | pyramid ms | lost | recovered | keyframes | colour scale |"
+    );
+    println!("|{}", " --- |".repeat(11));
+    for folder in folders {
+        let name = folder.file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned());
+        if !name.contains(&options.only) {
             continue;
         }
-        let Some(recording) = open(&Path::new(&data).join(name)) else { continue };
-        let camera = recording.camera.downscaled(recording.step);
-        let mut odometer = Odometer::new(config.clone());
-        let (mut online, mut truth) = (Vec::new(), Vec::new());
-        let (mut seconds, mut prepare, mut lost, mut recovered) = (0.0, 0.0, 0, 0);
-        let count = recording.frames.len().min(most);
-        for i in 0..count {
-            let frame = load(&recording, i);
-            let first = (i == 0).then_some(recording.frames[0].2);
-            let t = Instant::now();
-            let pyramid = RgbdPyramid::new(&frame, &camera, recording.unit_m, &config.pyramid)
-                .expect("frame");
-            prepare += t.elapsed().as_secs_f64();
-            let result = odometer.track(pyramid, first).expect("track");
-            seconds += t.elapsed().as_secs_f64();
-            lost += usize::from(result.lost);
-            recovered += usize::from(result.recovered);
-            online.push(result.world_from_camera.translation);
-            truth.push(recording.frames[i].2.translation);
-            if verbose {
-                let q = result.quality;
-                let e = recording.frames[i].2.inverse().compose(&result.world_from_camera);
-                let step = i.checked_sub(1).map_or(0.0, |j| {
-                    (recording.frames[i].2.translation - recording.frames[j].2.translation).length()
-                });
-                let own = i.checked_sub(1).map_or(0.0, |j| (online[i] - online[j]).length());
-                println!(
-                    "{i:4} step {:.2} {:.2} cm err {:6.2} cm {:5.2} deg  inl {:.2} ovl {:.2} g {:.2} mm p {:.4} cond {:.1e} refs {} {} {}",
-                    100.0 * step,
-                    100.0 * own,
-                    100.0 * e.translation.length(),
-                    e.angle_rad().to_degrees(),
-                    q.inlier_ratio,
-                    q.overlap,
-                    1e3 * q.geometric_rmse_m,
-                    q.photometric_rmse,
-                    q.conditioning,
-                    q.references,
-                    if result.keyframe.is_some() { "K" } else { "" },
-                    result.reason.map_or(String::new(), |r| format!("{r:?}")),
-                );
-            }
+        let wide = |s: &dyn Sequence| s.info().camera.width > 400;
+        let opened =
+            match (open(&folder, options.frames, options.scale.unwrap_or(1.0)), options.scale) {
+                (Ok(s), None) if wide(&*s) => open(&folder, options.frames, 0.5),
+                (opened, _) => opened,
+            };
+        match opened {
+            Ok(sequence) => measure(&name, sequence, &options)?,
+            Err(e) => println!("| {name} | {e} |"),
         }
-        if let Some(out) = &out {
-            // A line a frame: estimate, then truth, both `world_from_camera`, 3x4 row by row.
-            let mut text = String::new();
-            for ((_, estimate, _), (_, _, truth)) in
-                odometer.trajectory().iter().zip(&recording.frames)
-            {
-                let numbers = [estimate, truth].map(|p| p.to_row_major());
-                for x in numbers.iter().flat_map(|n| &n[..12]) {
-                    let _ = write!(text, "{x} ");
-                }
-                text.push('\n');
-            }
-            fs::write(out.join(format!("{name}.txt")), text).expect("out");
-        }
-        let last: Vec<DVec3> = odometer.trajectory().iter().map(|t| t.1.translation).collect();
-        if verbose {
-            println!("colour registration {:?}", odometer.colour_registration());
-        }
-        let (rmse, max) = ate(&last, &truth);
-        let (rmse_online, _) = ate(&online, &truth);
-        println!(
-            "| {name} | {count} | {:.3} | {:.3} | {:.3} | {:.1} | {:.1} | {lost} | {recovered} | {} |",
-            100.0 * rmse,
-            100.0 * rmse_online,
-            100.0 * max,
-            1e3 * seconds / count as f64,
-            1e3 * prepare / count as f64,
-            odometer.keyframes().len()
-        );
     }
+    Ok(())
 }

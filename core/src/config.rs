@@ -318,9 +318,9 @@ impl Default for FieldConfig {
     fn default() -> Self {
         FieldConfig {
             geometry_coarse_m: 0.24,
-            geometry_fine_m: 0.06,
+            geometry_fine_m: 0.04,
             surface_coarse_m: 0.24,
-            surface_fine_m: 0.03,
+            surface_fine_m: 0.02,
             truncation_m: 0.06,
             sharpness: 20.0,
             use_given_bounds: true,

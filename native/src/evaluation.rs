@@ -15,8 +15,9 @@ use mte_slam_core::{
     pose::Pose,
     sequence::Sequence,
     slam::{PoseEstimate, View},
+    track::odometry::ColourRegistration,
 };
-use std::path::Path;
+use std::{borrow::Cow, path::Path};
 
 /// A trajectory's error.
 pub struct TrajectoryScore {
@@ -59,11 +60,17 @@ pub struct ViewScores {
     input_labels: SemanticMeter,
     frames: Vec<usize>,
     info: SequenceInfo,
+    registration: ColourRegistration,
 }
 
 impl ViewScores {
-    /// No views yet; classes will be scored against `truth`.
-    pub fn new(info: &SequenceInfo, truth: ClassTruth) -> ViewScores {
+    /// No views yet; classes will be scored against `truth`, colours and labels where
+    /// `registration` puts them.
+    pub fn new(
+        info: &SequenceInfo,
+        truth: ClassTruth,
+        registration: ColourRegistration,
+    ) -> ViewScores {
         ViewScores {
             depth: DepthMeter::default(),
             color: PsnrMeter::default(),
@@ -72,6 +79,7 @@ impl ViewScores {
             truth,
             frames: Vec::new(),
             info: info.clone(),
+            registration,
         }
     }
 
@@ -80,8 +88,25 @@ impl ViewScores {
         &mut self.truth
     }
 
+    /// A frame as the map was trained with it, and its true labels likewise: resampled to the depth
+    /// camera where the colour camera has another focal length.
+    pub fn registered<'a>(
+        &mut self,
+        frame: &'a Frame,
+    ) -> Result<(Cow<'a, Frame>, Option<Vec<u8>>)> {
+        let mut labels = self.truth.of_frame(frame)?;
+        let (registration, camera) = (self.registration, &self.info.camera);
+        if !registration.is_identity()
+            && let Some(true_labels) = labels.take_if(|l| l.len() == camera.pixels())
+        {
+            let frame = Frame { labels: Some(true_labels), ..frame.clone() };
+            labels = registration.registered(&frame, camera).into_owned().labels;
+        }
+        Ok((registration.registered(frame, camera), labels))
+    }
+
     /// Add a view of `frame`, whose classes are those of the truth's table, as are `labels`, the
-    /// true ones of the frame.
+    /// true ones of the frame; both as [`ViewScores::registered`] gives them.
     pub fn add(&mut self, frame: &Frame, view: &View, labels: Option<&[u8]>) -> Result<()> {
         let place = || format!("scoring the view of frame {}", frame.index);
         self.depth.add(&view.depth_m, &frame.depth, self.info.depth_unit_m).with_context(place)?;
@@ -119,6 +144,13 @@ impl ViewScores {
             metrics.absent.insert("depth", reason.to_owned());
         }
         metrics.color = self.color.report();
+        let scale = self.registration.scale;
+        if let (Some(color), false) = (&mut metrics.color, self.registration.is_identity()) {
+            color.protocol += &format!(
+                "; against the input resampled to the depth camera, as the map was trained \
+                 (colour focal length {scale:.3} of the depth camera's, found from the images)"
+            );
+        }
         let figures = |meter: &SemanticMeter| {
             let report = meter.report()?;
             Some(SemanticFigures::new(&self.truth.name, report, &self.truth.table))

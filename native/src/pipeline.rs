@@ -82,6 +82,7 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
     slam.set_clock(clock_s);
 
     let (timings, labelled) = process(&mut slam, sequence.as_mut(), &record.dataset, screen)?;
+    record.colour_scale = slam.colour_registration().scale;
     // Without a single label the map's classes mean nothing: none are shown.
     let of_map = if labelled { info.classes.clone() } else { ClassTable::default() };
     let estimates = slam.trajectory();
@@ -103,7 +104,7 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
     } else {
         ClassTruth::none("no pixel of any label image has a class", &info)
     };
-    let mut scores = ViewScores::new(&info, class_truth);
+    let mut scores = ViewScores::new(&info, class_truth, slam.colour_registration());
     if output.render_every > 0 {
         let chosen: Vec<_> = estimates.iter().step_by(output.render_every).copied().collect();
         let sequence = sequence.as_mut();
@@ -301,27 +302,32 @@ fn render_views(
     let info = sequence.info().clone();
     let mut progress = screen.progress("rendering", chosen.len());
     for (i, estimate) in chosen.iter().enumerate() {
-        let mut frame = sequence.frame(estimate.frame).with_context(|| info.name.clone())?;
+        let frame = sequence.frame(estimate.frame).with_context(|| info.name.clone())?;
         let mut view = block_on(slam.render(&estimate.world_from_camera, &info.camera))
             .with_context(|| format!("rendering frame {}", estimate.frame))?;
         let stem = format!("renders/{:06}", estimate.frame);
         write_view(&view, of_map, &mut |kind, bytes| {
             folder.write(&format!("{stem}.{kind}.png"), bytes)
         })?;
-        let truth = scores.truth();
-        let labels = truth.of_frame(&frame)?;
-        view.class = truth.of_map(&view.class);
-        scores.add(&frame, &view, labels.as_deref())?;
+        view.class = scores.truth().of_map(&view.class);
+        let (trained, labels) = scores.registered(&frame)?;
+        let mut trained = trained.into_owned();
+        scores.add(&trained, &view, labels.as_deref())?;
         let truth = scores.truth();
         let no_classes = ClassTable::default();
-        frame.labels = frame.labels.map(|l| truth.of_map(&l));
+        trained.labels = trained.labels.map(|l| truth.of_map(&l));
+        let registered = if slam.colour_registration().is_identity() {
+            ""
+        } else {
+            "; input colour resampled to the depth camera"
+        };
         let title = format!(
-            "{}  frame {}  rendered at the estimated pose, without depth input",
+            "{}  frame {}  rendered at the estimated pose, without depth input{registered}",
             info.name, estimate.frame
         );
         let picture = sheet::sheet(&sheet::Sheet {
             title: &title,
-            frame: &frame,
+            frame: &trained,
             depth_unit_m: info.depth_unit_m,
             view: &view,
             table: if of_map.is_empty() { &no_classes } else { &truth.table },

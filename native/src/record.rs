@@ -37,6 +37,8 @@ pub struct RunRecord {
     /// The id asked to mean "no label", if any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unlabelled: Option<u16>,
+    /// Focal length of the colour camera over that of the depth camera, as the map was trained.
+    pub colour_scale: f64,
     /// `gpu` or `cpu`.
     pub engine: String,
     /// Adapter, or processor architecture.
@@ -63,6 +65,7 @@ impl Default for RunRecord {
             truth_labels: "dataset".to_owned(),
             classes: None,
             unlabelled: None,
+            colour_scale: 1.0,
             engine: String::new(),
             adapter: String::new(),
             backend: String::new(),

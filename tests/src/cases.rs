@@ -189,6 +189,7 @@ pub fn cases(kernel: &str) -> Vec<Case> {
             chained("all intervals", &COMPOSITE, &light, &["weights"]),
             chained("unguided", &COMPOSITE, &unguided, &["weights"]),
             chained("no classes", &COMPOSITE, &classless, &["weights"]),
+            chained("views", &COMPOSITE, &Options { flags: FLAG_DENSE, ..usual }, &["weights"]),
         ],
         "decode_rays" => vec![
             chained("classes", &DECODE_RAYS, &usual, &["ray_out", "logits_gradient"]),

@@ -1,18 +1,23 @@
 //! Mistakes known from other systems of this kind, on both engines.
 use mte_slam_core::{
+    config::{Config, LossConfig},
+    device::{Batch, Device},
     engine::Engine,
     kernels::{
         adam::{ADAM, AdamParams},
+        composite::COMPOSITE,
         composite_backward::COMPOSITE_BACKWARD,
         shared::{FLAG_DENSE, FLAG_GUIDED, FLAG_MAP, FLAG_MASK, FLAG_POSE, Grid, plane_corners},
     },
-    layout::CHANNELS,
+    layout::{CHANNELS, RAY_STATE_FLOATS, STATE_DEPTH},
+    recording::Recording,
 };
 use mte_slam_tests::{
     f32_words,
-    fixture::{Options, State, run_words, words},
+    fixture::{self, CLASSES, DEPTH_UNIT_M, Options, State, run_words, words},
     gpu_engine,
 };
+use pollster::block_on;
 
 fn engines() -> Vec<Engine> {
     let mut engines = vec![Engine::cpu()];
@@ -120,6 +125,38 @@ fn importance_samples_follow_the_trained_distance() {
     }
 }
 
+/// A view's ray that meets the edge of a surface, which takes 60 % of its light, and a wall behind
+/// shows the edge's depth; training goes by the mean of both.
+#[test]
+fn views_show_no_depth_between_an_edge_and_what_is_behind() {
+    for mut engine in engines() {
+        for (flags, view) in [(FLAG_DENSE, true), (FLAG_GUIDED | FLAG_MAP, false)] {
+            let mut state = State::new(&Options { flags, ..Options::default() });
+            state.forward(&mut engine);
+            let (n, rays) = (state.params.samples as usize, state.params.rays as usize);
+            let edge = (0.4_f32 / 0.6).ln() / state.params.sharpness;
+            let distance = |i: usize| match i {
+                5 => edge,
+                11.. => -1.0,
+                _ => 1.0,
+            };
+            let each =
+                |value: &dyn Fn(usize) -> f32| f32_words((0..rays * n).map(|i| value(i % n)));
+            state.buffers.insert("distances", each(&distance));
+            state.buffers.insert("depths", each(&|i| 0.1 * i as f32));
+            state.run(&mut engine, &COMPOSITE);
+            let out = state.floats("ray_state");
+            for (i, ray) in out.chunks(RAY_STATE_FLOATS).enumerate() {
+                let at = STATE_DEPTH as usize * 4;
+                let (depth, opacity) = (ray[at], ray[at + 1]);
+                assert!((opacity - 1.0).abs() < 1e-3, "ray {i}: {opacity}");
+                let expected = if view { 0.4 + 0.1 * 0.5 / 0.6 } else { 0.6 * 0.45 + 0.4 * 1.05 };
+                assert!((depth - expected).abs() < 2e-3, "ray {i}: {depth}, not {expected}");
+            }
+        }
+    }
+}
+
 /// Moments that fade become 0 and never denormal; parameters stay finite.
 #[test]
 fn adam_has_no_denormals() {
@@ -159,5 +196,61 @@ fn adam_has_no_denormals() {
         }
         assert!(state[0].iter().all(|w| f32::from_bits(*w).is_finite()));
         assert_eq!(state[4][0], 0);
+    }
+}
+
+/// A slot that held one frame and now holds another moves the new frame's pose exactly as a slot
+/// that never held any: the pose optimiser's moments of the former frame are forgotten.
+#[test]
+fn a_reused_slot_forgets_the_pose_steps_of_its_former_frame() {
+    const SLOT: u32 = 1;
+    const RAYS: u32 = 100;
+    let mut config = Config { field: fixture::field_config(), ..Config::default() };
+    (config.sampling.stratified, config.sampling.surface) = (12, 4);
+    (config.mapping.rays, config.tracking.render_rays) = (RAYS, 1);
+    config.keyframes.budget_mib = 1;
+    let loss = LossConfig::default();
+    let last_step = |engine: Engine, former: Option<u32>| {
+        let (camera, shape) = (fixture::camera(), fixture::shape());
+        let d = &mut Device::new(engine, &config, camera, DEPTH_UNIT_M, CLASSES, shape).unwrap();
+        let mut r = Recording::new();
+        let state = State::new(&Options::default());
+        r.upload(d.geometry.values, 0, &state.buffers["planes_geometry"]);
+        r.upload(d.appearance.values, 0, &state.buffers["planes_appearance"]);
+        r.upload(d.decoders.values, 0, &state.buffers["decoders"]);
+        d.upload_window(&mut r, &[(SLOT, false)]);
+        let step = |r: &mut Recording, iteration| {
+            let batch = Batch {
+                frames: 1,
+                rays_per_frame: RAYS,
+                stratified: 12,
+                surface: 4,
+                flags: FLAG_GUIDED | FLAG_MAP | FLAG_POSE,
+                loss: &loss,
+                iteration,
+                first: 0,
+            };
+            d.record_forward(r, &batch);
+            d.record_backward(r, &batch);
+            d.record_pose_step(r, &batch, 1e-3, 1e-3, false);
+        };
+        if let Some(former) = former {
+            d.upload_frame(&mut r, SLOT, &fixture::frame(former));
+            d.upload_pose(&mut r, SLOT, &fixture::pose(former));
+            (0..5).for_each(|iteration| step(&mut r, iteration));
+        }
+        d.upload_frame(&mut r, SLOT, &fixture::frame(0));
+        d.upload_pose(&mut r, SLOT, &fixture::pose(0));
+        step(&mut r, 5);
+        d.engine.submit(&r).unwrap();
+        let state = block_on(d.read_pose_state(SLOT)).unwrap();
+        let pose = block_on(d.read_poses(SLOT + 1)).unwrap()[SLOT as usize].unwrap();
+        let moved = (pose.translation - fixture::pose(0).translation).length();
+        assert!(moved > 5e-4, "the pose moved by {moved} m");
+        (state, pose)
+    };
+    for (fresh, reused) in engines().into_iter().zip(engines()) {
+        let fresh = last_step(fresh, None);
+        assert_eq!(last_step(reused, Some(2)), fresh);
     }
 }

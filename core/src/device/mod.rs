@@ -344,6 +344,18 @@ impl Device {
         r.upload(self.token_class_weights, 0, fusion);
     }
 
+    /// Colour and label of a slot's pixels.
+    pub async fn read_color(&mut self, slot: u32) -> Result<Vec<[u8; 4]>, EngineError> {
+        let pixels = self.camera.pixels();
+        let words = self.engine.read(self.color_images, slot as usize * pixels, pixels).await?;
+        Ok(words.into_iter().map(u32::to_le_bytes).collect())
+    }
+
+    /// Replaces colour and label of a slot's pixels.
+    pub fn upload_color(&self, r: &mut Recording, slot: u32, image: &[[u8; 4]]) {
+        r.upload(self.color_images, slot as usize * self.camera.pixels(), image);
+    }
+
     /// Sets the pose of a slot.
     pub fn upload_pose(&self, r: &mut Recording, slot: u32, pose: &Pose) {
         r.upload(self.poses, slot as usize * 12, &pose_words(pose));

@@ -1,6 +1,6 @@
 //! Interval weights, composited depth, opacity and features.
-use super::shared::{Grid, Ray, interval_alpha, phi};
-use super::{CpuDispatch, store_f32};
+use super::shared::{FLAG_DENSE, FLAG_MAP, FLAG_POSE, Grid, Ray, interval_alpha, phi};
+use super::{CpuDispatch, load_f32, store_f32};
 use crate::{
     layout::{FieldParams, RAY_STATE_FLOATS, STATE_APPEARANCE, STATE_DEPTH, STATE_SEMANTIC},
 };
@@ -68,6 +68,20 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             phi0 = phi1;
         }
         store_f32(&weights[base + n - 1], 0.0);
+        // Views show the depth that half of the light reaches: a mean over the edge of a surface
+        // would lie in the air between it and what is behind.
+        if p.flags & (FLAG_DENSE | FLAG_MAP | FLAG_POSE) == FLAG_DENSE {
+            let (mut before, mut i) = (0.0, 1);
+            let mut w = load_f32(&weights[base]);
+            while i + 1 < n && before + w < 0.5 * opacity {
+                before += w;
+                w = load_f32(&weights[base + i]);
+                i += 1;
+            }
+            let t = ((0.5 * opacity - before) / w.max(1e-12)).clamp(0.0, 1.0);
+            let (z0, z1) = (depths[base + i - 1], depths[base + i]);
+            depth = opacity * (z0 + t * (z1 - z0));
+        }
         let state = &ray_state[id * RAY_STATE_FLOATS..(id + 1) * RAY_STATE_FLOATS];
         for k in 0..32 {
             store_f32(&state[STATE_APPEARANCE as usize * 4 + k], appearance[k]);

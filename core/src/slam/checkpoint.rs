@@ -10,6 +10,7 @@ use crate::{
     frame::{Bounds, SequenceInfo},
     pose::Pose,
     recording::Recording,
+    track::odometry::ColourRegistration,
 };
 use alloc::{
     collections::BTreeMap,
@@ -67,6 +68,9 @@ struct State {
     statuses: Vec<u8>,
     poses: Vec<[f64; 16]>,
     observed_frames: Vec<usize>,
+    /// Where the colours lie that the map was trained with.
+    #[serde(default)]
+    colour_registration: ColourRegistration,
 }
 
 fn tensor<T: bytemuck::Pod>(name: &str, dtype: Dtype, shape: Vec<usize>, values: &[T]) -> Tensor {
@@ -117,6 +121,7 @@ impl Slam {
             statuses: self.frames.iter().map(|f| f.status as u8).collect(),
             poses: self.frames.iter().map(|f| f.world_from_camera.to_row_major()).collect(),
             observed_frames: self.observations.iter().map(|o| o.frame).collect(),
+            colour_registration: self.registration,
         };
         let json = serde_json::to_string(&state).map_err(|e| wrong("state", e, "JSON"))?;
         let metadata = [("format", FORMAT.to_string()), ("state", json)];
@@ -197,7 +202,12 @@ impl Slam {
                 device.engine.submit(&r)?;
             }
         }
+        let scale = state.colour_registration.scale;
+        if !(scale > 0.1 && scale < 10.0) {
+            return Err(wrong("colour_registration.scale", scale, "0.1 to 10"));
+        }
         let mut slam = Slam::new(device_placeholder(), state.config, &info).await?;
+        slam.registration = state.colour_registration;
         let depth = find("observed_depth")?;
         let all: Vec<u32> = bytemuck::pod_collect_to_vec(&depth.bytes);
         let step = super::mapping::observation_step(camera.width);

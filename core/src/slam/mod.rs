@@ -8,6 +8,9 @@ mod output;
 mod semantics;
 mod tracking;
 
+#[cfg(all(test, feature = "std"))]
+mod tests;
+
 pub use checkpoint::{Checkpoint, Dtype, Tensor};
 pub use output::View;
 
@@ -19,9 +22,10 @@ use crate::{
     keyframe::Keyframe,
     mesh::MeshError,
     pose::Pose,
-    track::odometry::{Odometer, OdometryConfig, OdometryError},
+    recording::Recording,
+    track::odometry::{ColourRegistration, Odometer, OdometryConfig, OdometryError},
 };
-use alloc::{format, string::String, vec::Vec};
+use alloc::{borrow::Cow, format, string::String, vec::Vec};
 
 /// What a run could not do.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -144,6 +148,8 @@ pub struct Slam {
     engine: Option<Engine>,
     device: Option<Device>,
     odometer: Odometer,
+    /// Where the colours of the images on the device have been found to lie.
+    registration: ColourRegistration,
     frames: Vec<PoseEstimate>,
     keyframes: Vec<Keyframe>,
     observations: Vec<Observation>,
@@ -176,6 +182,7 @@ impl Slam {
             engine: Some(engine),
             device: None,
             odometer: Odometer::new(OdometryConfig::default()),
+            registration: ColourRegistration::default(),
             frames: Vec::new(),
             keyframes: Vec::new(),
             observations: Vec::new(),
@@ -208,7 +215,8 @@ impl Slam {
         let mut losses = None;
         let mut keyframe = false;
         if status != TrackingStatus::Lost && (due || new_reference) {
-            let mapped = self.map(frame, new_reference).await?;
+            let frame = self.registered(frame);
+            let mapped = self.map(&frame, new_reference).await?;
             losses = Some(mapped.0);
             keyframe = mapped.1;
         }
@@ -224,6 +232,43 @@ impl Slam {
             losses,
             keyframe,
         })
+    }
+
+    /// Where the map takes the colour image to lie on the depth image: what the odometry has found,
+    /// the identity as long as nothing speaks against it (and with true poses, where no odometry
+    /// runs).
+    pub fn colour_registration(&self) -> ColourRegistration {
+        self.registration
+    }
+
+    /// The frame as the map is trained with it: colour and labels in the depth camera's pixels.
+    /// Compare rendered views with this.
+    pub fn registered<'a>(&self, frame: &'a Frame) -> Cow<'a, Frame> {
+        self.registration.registered(frame, &self.info.camera)
+    }
+
+    /// Takes over a registration of colour that the odometry found or improved. It settles only
+    /// after some keyframes; the images of those before are still on the device, so they are read
+    /// back, resampled and stored again. What the map has already learnt from them fades as later
+    /// iterations draw from the corrected images.
+    pub(super) async fn follow_registration(&mut self) -> Result<(), SlamError> {
+        let found = self.odometer.colour_registration();
+        if found == self.registration {
+            return Ok(());
+        }
+        // The stored images have the former registration applied.
+        let change = ColourRegistration { scale: found.scale / self.registration.scale };
+        self.registration = found;
+        let camera = self.info.camera;
+        let slots: Vec<u32> = self.keyframes.iter().map(|k| k.slot).collect();
+        for slot in slots {
+            let device = self.device()?;
+            let image = device.read_color(slot).await?;
+            let mut r = Recording::default();
+            device.upload_color(&mut r, slot, &change.resampled(&image, &camera));
+            device.engine.submit(&r)?;
+        }
+        Ok(())
     }
 
     /// The poses so far, with every correction.

@@ -55,6 +55,8 @@ impl Slam {
         let pyramid = RgbdPyramid::new(frame, &self.info.camera, self.info.depth_unit_m, &config)?;
         let start = first.then(|| frame.truth.unwrap_or(Pose::IDENTITY));
         let found = self.odometer.track(pyramid, start)?;
+        self.follow_registration().await?;
+        let frame = &*self.registered(frame);
         let mut pose = found.world_from_camera;
         if found.lost {
             push(&mut self.frames, pose, TrackingStatus::Lost);

@@ -21,6 +21,7 @@ use mte_slam_core::{
     pose::Pose,
     sequence::Sequence,
     slam::View,
+    track::odometry::ColourRegistration,
 };
 use std::path::Path;
 
@@ -71,7 +72,8 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
         ..Metrics::default()
     };
     evaluate_trajectory(out, sequence.as_ref(), &mut metrics)?;
-    evaluate_renders(out, sequence.as_mut(), class_truth, screen, &mut metrics)?;
+    let registration = ColourRegistration { scale: record.colour_scale };
+    evaluate_renders(out, sequence.as_mut(), class_truth, registration, screen, &mut metrics)?;
     let path = out.join("mesh.ply");
     match truth_mesh {
         Err(reason) => {
@@ -150,6 +152,7 @@ fn evaluate_renders(
     out: &Path,
     sequence: &mut dyn Sequence,
     class_truth: ClassTruth,
+    registration: ColourRegistration,
     screen: Screen,
     metrics: &mut Metrics,
 ) -> Result<()> {
@@ -158,13 +161,13 @@ fn evaluate_renders(
     let folder = out.join("renders");
     let rendered: Vec<usize> =
         (0..info.frames).filter(|i| folder.join(format!("{i:06}.color.png")).is_file()).collect();
-    let mut scores = ViewScores::new(&info, class_truth);
+    let mut scores = ViewScores::new(&info, class_truth, registration);
     let mut progress = screen.progress("comparing pictures", rendered.len());
     for (i, &index) in rendered.iter().enumerate() {
         let truth = scores.truth();
         let view = read_view(&folder, index, &info, &truth.table, unlabelled)?;
         let frame = sequence.frame(index)?;
-        let labels = truth.of_frame(&frame)?;
+        let (frame, labels) = scores.registered(&frame)?;
         scores.add(&frame, &view, labels.as_deref())?;
         progress.set(i as u64 + 1, String::new);
     }

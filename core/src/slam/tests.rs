@@ -1,0 +1,106 @@
+//! The loop as a whole, on small frames of the built-in room.
+use super::*;
+use crate::{
+    camera::Camera,
+    sequence::Sequence,
+    synth::{SyntheticOptions, SyntheticSequence},
+};
+use alloc::{vec, vec::Vec};
+use pollster::block_on;
+
+/// Focal length of the colour camera over that of the depth camera.
+const SCALE: f64 = 0.9;
+
+/// The room through a depth camera whose colour camera has another focal length.
+struct Unregistered {
+    /// As the colour camera sees it.
+    color: SyntheticSequence,
+    /// Four times as large, to take the depth camera's pixels from.
+    fine: SyntheticSequence,
+    info: SequenceInfo,
+}
+
+impl Unregistered {
+    fn new() -> Unregistered {
+        let options = SyntheticOptions { width: 128, height: 96, ..SyntheticOptions::default() };
+        let color = SyntheticSequence::new(options);
+        let (width, height) = (4 * options.width, 4 * options.height);
+        let fine = SyntheticSequence::new(SyntheticOptions { width, height, ..options });
+        let mut info = color.info().clone();
+        info.camera.fx /= SCALE;
+        info.camera.fy /= SCALE;
+        Unregistered { color, fine, info }
+    }
+
+    /// A frame with colour as recorded, and the colour that belongs to its depth pixels.
+    fn frame(&mut self, index: usize, at: usize) -> (Frame, Vec<[u8; 3]>) {
+        let recorded = self.color.frame(at).unwrap();
+        let fine = self.fine.frame(at).unwrap();
+        let (depth_camera, camera) = (self.info.camera, self.fine.info().camera);
+        let mut frame = Frame { index, labels: Some(Vec::new()), depth: Vec::new(), ..recorded };
+        let mut registered = Vec::new();
+        for v in 0..depth_camera.height {
+            for u in 0..depth_camera.width {
+                let p = depth_camera.back_project(u.into(), v.into(), 1.0);
+                let at = camera.project(p).unwrap();
+                let i = at.y.round() as usize * camera.width as usize + at.x.round() as usize;
+                frame.depth.push(fine.depth[i]);
+                // A pixel of the depth camera is 3.6 of these wide.
+                let mean = |k: usize| {
+                    let rows = [-1, 0, 1].map(|dv| i as isize + dv * camera.width as isize);
+                    let all = rows.iter().flat_map(|r| [r - 1, *r, r + 1]);
+                    let last = fine.color.len() as isize - 1;
+                    let sum: u32 =
+                        all.map(|j| u32::from(fine.color[j.clamp(0, last) as usize][k])).sum();
+                    (sum / 9) as u8
+                };
+                registered.push([mean(0), mean(1), mean(2)]);
+            }
+        }
+        frame.labels = None;
+        (frame, registered)
+    }
+}
+
+fn psnr_db(a: &[[u8; 3]], b: &[[u8; 3]]) -> f64 {
+    crate::metrics::PsnrMeter::default().add(a, b).unwrap()
+}
+
+#[test]
+fn the_map_gets_its_colours_where_the_odometer_found_them() {
+    let mut room = Unregistered::new();
+    let camera: Camera = room.info.camera;
+    let mut config = Config::preset("fast").unwrap();
+    (config.mapping.rays, config.mapping.first_iterations) = (1000, 60);
+    room.info.classes = Default::default();
+    let mut slam = block_on(Slam::new(Engine::cpu(), config, &room.info)).unwrap();
+    let mut frames = vec![];
+    for index in 0..12 {
+        let (frame, registered) = room.frame(index, 5 * index);
+        block_on(slam.process(&frame)).unwrap();
+        frames.push((frame, registered));
+    }
+    block_on(slam.finish()).unwrap();
+    let found = slam.colour_registration().scale;
+    assert!((found - SCALE).abs() < 0.02, "{found}");
+    // The first frame was stored long before anything was known.
+    let first = slam.keyframes[0].clone();
+    assert_eq!(first.frame, 0);
+    let stored = block_on(slam.device().unwrap().read_color(first.slot)).unwrap();
+    let stored: Vec<[u8; 3]> = stored.iter().map(|p| [p[0], p[1], p[2]]).collect();
+    let (before, after) =
+        (psnr_db(&frames[0].0.color, &frames[0].1), psnr_db(&stored, &frames[0].1));
+    let (mut as_recorded, mut as_trained, mut compared) = (0.0, 0.0, f64::MAX);
+    for (estimate, (frame, registered)) in slam.trajectory().iter().zip(&frames).step_by(4) {
+        let view = block_on(slam.render(&estimate.world_from_camera, &camera)).unwrap();
+        as_recorded += psnr_db(&view.color, &frame.color) / 3.0;
+        as_trained += psnr_db(&view.color, registered) / 3.0;
+        // What the metrics compare with is that, too.
+        compared = compared.min(psnr_db(&slam.registered(frame).color, registered));
+    }
+    println!(
+        "stored {before:.1} -> {after:.1} dB, rendered {as_recorded:.1} -> {as_trained:.1}, compared with {compared:.1}"
+    );
+    assert!(after > before + 5.0 && compared > before + 5.0);
+    assert!(as_trained > as_recorded + 3.0);
+}
