@@ -9,7 +9,9 @@ use crate::{
         checkpoint, classes,
         folder::OutputFolder,
         meshes,
-        metrics::{ConfigurationRecord, MemoryFigures, Metrics, SequenceRecord, TimeFigures},
+        metrics::{
+            AnchorFigures, ConfigurationRecord, MemoryFigures, Metrics, SequenceRecord, TimeFigures,
+        },
         pictures, plot, sheet,
         timings::{Spread, Timing, write_csv},
         trajectory::write_tum,
@@ -98,6 +100,7 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
     metrics.lost_frames =
         estimates.iter().filter(|e| e.status == TrackingStatus::Lost).map(|e| e.frame).collect();
 
+    write_anchors(&slam, &folder, &mut metrics)?;
     write_trajectory(&folder, sequence.as_ref(), &estimates, &truth, &mut metrics)?;
     let class_truth = if labelled || info.classes.is_empty() {
         job.class_truth
@@ -229,6 +232,26 @@ fn status_name(status: TrackingStatus) -> &'static str {
         TrackingStatus::Tracked => "tracked",
         TrackingStatus::Lost => "lost",
     }
+}
+
+/// The suppressor's statistics and their picture, where there is one.
+fn write_anchors(slam: &Slam, folder: &OutputFolder, metrics: &mut Metrics) -> Result<()> {
+    let Some((_, last)) = slam.anchor_history().last() else { return Ok(()) };
+    let history: Vec<_> = slam
+        .anchor_history()
+        .iter()
+        .map(|(frame, c)| (*frame, c.alive, c.spawned, c.dropped, c.merged))
+        .collect();
+    let limit = slam.config().suppressor.anchors;
+    let svg = plot::anchors_svg(&slam.info().name, &history, limit);
+    folder.write("anchors.svg", svg.as_bytes())?;
+    metrics.anchors = Some(AnchorFigures {
+        protocol: "after each call of the optimisation: last frame, anchors in use, and since the start spawned, dropped, merged",
+        limit,
+        last: *last,
+        history,
+    });
+    Ok(())
 }
 
 fn write_trajectory(

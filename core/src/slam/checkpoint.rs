@@ -8,8 +8,9 @@ use crate::{
     engine::Engine,
     field::FieldShape,
     frame::{Bounds, SequenceInfo},
+    layout::ANCHOR_FLOATS,
     pose::Pose,
-    recording::Recording,
+    recording::{BufferId, Recording},
     track::odometry::ColourRegistration,
 };
 use alloc::{
@@ -52,7 +53,7 @@ pub struct Checkpoint {
     pub metadata: BTreeMap<String, String>,
 }
 
-const FORMAT: &str = "mte-slam-1";
+const FORMAT: &str = "mte-slam-2";
 
 #[derive(Serialize, Deserialize)]
 struct State {
@@ -100,6 +101,10 @@ impl Slam {
                 let v: Vec<f32> = device.engine.read_as(buffer, 0, t.floats).await?;
                 tensors.push(tensor(&format!("{name}.{part}"), Dtype::F32, vec![v.len()], &v));
             }
+        }
+        for (name, buffer, n) in words(device) {
+            let v = device.engine.read(buffer, 0, n).await?;
+            tensors.push(tensor(name, Dtype::U32, vec![n], &v));
         }
         let (bounds, step) = (device.shape.bounds, device.step);
         let pixels = self.observations.first().map_or(0, |o| o.depth.len());
@@ -206,6 +211,17 @@ impl Slam {
         if !(scale > 0.1 && scale < 10.0) {
             return Err(wrong("colour_registration.scale", scale, "0.1 to 10"));
         }
+        for (name, buffer, n) in words(&device) {
+            let found = find(name)?;
+            if found.dtype != Dtype::U32 || found.bytes.len() != n * 4 {
+                let expected = format!("{} bytes of u32", n * 4);
+                return Err(wrong(name, format!("{} bytes", found.bytes.len()), expected));
+            }
+            let values: Vec<u32> = bytemuck::pod_collect_to_vec(&found.bytes);
+            let mut r = Recording::default();
+            r.upload(buffer, 0, &values);
+            device.engine.submit(&r)?;
+        }
         let mut slam = Slam::new(device_placeholder(), state.config, &info).await?;
         slam.registration = state.colour_registration;
         let depth = find("observed_depth")?;
@@ -245,11 +261,23 @@ fn device_placeholder() -> Engine {
     Engine::Cpu(crate::engine::CpuEngine::default())
 }
 
-fn parameters(device: &Device) -> [(&'static str, Trained); 4] {
-    [
+fn parameters(device: &Device) -> Vec<(&'static str, Trained)> {
+    let mut all = vec![
         ("planes.geometry", device.geometry),
         ("planes.appearance", device.appearance),
         ("planes.semantic", device.semantic),
         ("decoders", device.decoders),
+    ];
+    all.extend(device.fusion.as_ref().map(|f| ("fusion", f.parameters)));
+    all
+}
+
+/// Buffers of words, which are read and written as they are.
+fn words(device: &Device) -> Vec<(&'static str, BufferId, usize)> {
+    let Some(s) = &device.suppressor else { return Vec::new() };
+    let slots = s.slots() as usize;
+    vec![
+        ("anchors", s.anchors, slots * ANCHOR_FLOATS),
+        ("anchors.votes", s.votes, slots * device.classes as usize),
     ]
 }

@@ -322,6 +322,7 @@ impl Slam {
         if device.read_status().await? & crate::kernels::adam::STATUS_NOT_FINITE != 0 {
             return Err(SlamError::NotFinite { frame: last_frame });
         }
+        let counts = device.read_anchor_counts().await?;
         if refine {
             let slots = device.slots;
             let poses = device.read_poses(slots).await?;
@@ -333,6 +334,7 @@ impl Slam {
                 }
             }
         }
+        self.anchor_history.extend(counts.map(|c| (last_frame, c)));
         Ok(losses)
     }
 }

@@ -16,7 +16,7 @@ pub use output::View;
 
 use crate::{
     config::{Config, ConfigError, Tracker},
-    device::Device,
+    device::{AnchorCounts, Device},
     engine::{Engine, EngineError},
     frame::{Bounds, Frame, SequenceInfo},
     keyframe::Keyframe,
@@ -159,6 +159,7 @@ pub struct Slam {
     bounds_refused: bool,
     class_counts: semantics::ClassCounts,
     mapping_calls: u32,
+    anchor_history: Vec<(usize, AnchorCounts)>,
     clock: Option<fn() -> f64>,
 }
 
@@ -191,6 +192,7 @@ impl Slam {
             bounds_refused: false,
             class_counts: semantics::ClassCounts::default(),
             mapping_calls: 0,
+            anchor_history: Vec::new(),
             clock: None,
         })
     }
@@ -279,6 +281,12 @@ impl Slam {
     /// The keyframes kept for mapping.
     pub fn keyframes(&self) -> &[Keyframe] {
         &self.keyframes
+    }
+
+    /// What the redundancy suppressor did: after each call of the optimisation the last frame's
+    /// index and the counts so far. Empty without it.
+    pub fn anchor_history(&self) -> &[(usize, AnchorCounts)] {
+        &self.anchor_history
     }
 
     /// The configuration.

@@ -3,6 +3,7 @@
 use super::timings::Spread;
 use mte_slam_core::{
     classes::{Class, ClassTable},
+    device::AnchorCounts,
     metrics::{
         AteReport, BoundaryReport, DepthReport, PsnrReport, SMALL_SHARE_PERCENT, SemanticReport,
         SurfaceReport,
@@ -50,6 +51,9 @@ pub struct Metrics {
     /// The labels that the map learnt from against the true labels, where those are others.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub input_labels: Option<SemanticFigures>,
+    /// What the redundancy suppressor did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub anchors: Option<AnchorFigures>,
     /// Mesh against the true mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<SurfaceReport>,
@@ -61,6 +65,20 @@ pub struct Metrics {
     pub memory: Option<MemoryFigures>,
     /// Section -> why it is not there.
     pub absent: BTreeMap<&'static str, String>,
+}
+
+/// What the redundancy suppressor did.
+#[derive(Debug, Clone, Serialize)]
+pub struct AnchorFigures {
+    /// What the figures mean.
+    pub protocol: &'static str,
+    /// Most anchors there may be.
+    pub limit: u32,
+    /// At the end.
+    #[serde(flatten)]
+    pub last: AnchorCounts,
+    /// (frame, anchors in use, spawned, dropped, merged), the last three counted from the start.
+    pub history: Vec<(usize, u32, u32, u32, u32)>,
 }
 
 /// What was read.

@@ -187,6 +187,80 @@ fn panel(s: &mut String, plot: &Plot, left: f64, name: &str, a: usize, b: usize)
     }
 }
 
+/// `anchors.svg`: anchors in use, and how many were spawned, dropped and merged so far, over the
+/// calls of the optimisation. `history`: (frame, in use, spawned, dropped, merged).
+pub fn anchors_svg(title: &str, history: &[(usize, u32, u32, u32, u32)], limit: u32) -> String {
+    let (left, top, width, height) = (70.0, TOP, 1100.0, 440.0);
+    let most = history.iter().map(|h| h.2.max(h.1)).max().unwrap_or(0).max(limit).max(1);
+    let px = |i: usize| left + width * i as f64 / (history.len().max(2) - 1) as f64;
+    let py = |v: u32| top + height * (1.0 - f64::from(v) / f64::from(most));
+    let mut s = String::new();
+    let _ = writeln!(
+        s,
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} 600\" width=\"{WIDTH}\" \
+         height=\"600\" font-family=\"Helvetica, Arial, sans-serif\" font-size=\"13\">\n\
+         <rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n\
+         <text x=\"60\" y=\"30\" font-size=\"18\" font-weight=\"bold\">{}</text>\n\
+         <text x=\"60\" y=\"52\" fill=\"#444\">anchors of the redundancy suppressor over the \
+         calls of the optimisation</text>\n\
+         <rect x=\"{left}\" y=\"{top}\" width=\"{width}\" height=\"{height}\" fill=\"none\" \
+         stroke=\"#888\"/>\n\
+         <path d=\"M{left} {y:.1}h{width}\" stroke=\"#9aa0a6\" stroke-dasharray=\"6 4\"/>\
+         <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" fill=\"#444\">limit {limit}</text>",
+        escape(title),
+        left + width - 6.0,
+        py(limit) + 16.0,
+        y = py(limit),
+    );
+    let step = nice_step(f64::from(most) / 6.0).max(1.0) as u32;
+    for v in (0..=most).step_by(step as usize) {
+        let y = py(v);
+        let _ = writeln!(
+            s,
+            "<path d=\"M{left} {y:.1}h{width}\" stroke=\"#e4e6ea\"/>\
+             <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{v}</text>",
+            left - 6.0,
+            y + 4.0
+        );
+    }
+    for i in (0..history.len()).step_by(history.len().div_ceil(10).max(1)) {
+        let _ = writeln!(
+            s,
+            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">frame {}</text>",
+            px(i),
+            top + height + 17.0,
+            history[i].0
+        );
+    }
+    type Column = fn(&(usize, u32, u32, u32, u32)) -> u32;
+    let columns: [(&str, &str, Column); 4] = [
+        ("in use", "#1a56db", |h| h.1),
+        ("spawned", "#0f9d58", |h| h.2),
+        ("dropped", "#d93025", |h| h.3),
+        ("merged", "#e37400", |h| h.4),
+    ];
+    for (i, (name, color, value)) in columns.into_iter().enumerate() {
+        let path: Vec<String> = history
+            .iter()
+            .enumerate()
+            .map(|(k, h)| format!("{:.1},{:.1}", px(k), py(value(h))))
+            .collect();
+        let x = left + 140.0 * i as f64;
+        let y = top + height + 46.0;
+        let _ = writeln!(
+            s,
+            "<polyline points=\"{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"2\"/>\
+             <path d=\"M{x} {y}h28\" stroke=\"{color}\" stroke-width=\"3\"/>\
+             <text x=\"{}\" y=\"{}\">{name}</text>",
+            path.join(" "),
+            x + 34.0,
+            y + 4.0
+        );
+    }
+    s.push_str("</svg>\n");
+    s
+}
+
 /// The largest of 1, 2, 5 times a power of ten that is not above `rough` by more than half.
 fn nice_step(rough: f64) -> f64 {
     let power = 10f64.powf(rough.log10().floor());
