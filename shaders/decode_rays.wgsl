@@ -112,6 +112,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
         var nearest_class = 255u;
         var distance = 1e30;
         var own_distance = 1e30;
+        var own_nearest = ${NO_ANCHOR}u;
         for (var a = 0u; a < params.anchors; a++) {
             let at = a * ${ANCHOR_VEC4}u;
             let class_id = bitcast<u32>(anchors[at + 4u].x);
@@ -128,8 +129,9 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
                 nearest_class = class_id;
                 distance = d;
             }
-            if (class_id == label) {
-                own_distance = min(own_distance, d);
+            if (class_id == label && d < own_distance) {
+                own_nearest = a;
+                own_distance = d;
             }
         }
         if ((params.flags & FLAG_ANCHORS) != 0u && nearest != ${NO_ANCHOR}u) {
@@ -137,11 +139,13 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
         }
         var loss_feature = 0.0;
         if (!masked && params.weight_compression > 0.0 && nearest != ${NO_ANCHOR}u) {
-            let at = nearest * ${ANCHOR_VEC4}u;
+            // A feature much further from its label's anchor than from the nearest is taken for mislabelled.
+            let own = own_distance < 4.0 * distance;
+            let at = select(nearest, own_nearest, own) * ${ANCHOR_VEC4}u;
 #for j in 0..4
             df[${j}] += 2.0 * params.weight_compression * inv_rays * (feature[${j}] - anchors[at + ${j}u]);
 #end
-            loss_feature += params.weight_compression * distance;
+            loss_feature += params.weight_compression * select(distance, own_distance, own);
         }
         // The fused feature of the pixel's token is the target of the feature loss.
         if (!masked && params.weight_feature > 0.0 && params.token_columns > 0u) {

@@ -51,14 +51,35 @@ struct Match {
     index: u32,
     class: u32,
     distance: f32,
-    /// To the nearest anchor of the ray's own class.
+    /// The nearest anchor of the ray's own class.
+    own_index: u32,
     own_distance: f32,
+}
+
+/// A feature this much (squared) further from its label's anchor than from the nearest one is
+/// taken for mislabelled; below, the label decides what it is pulled to.
+const DOUBT: f32 = 4.0;
+
+impl Match {
+    /// The anchor that the compression loss pulls to, and the squared distance.
+    fn held_by(&self) -> (u32, f32) {
+        if self.own_distance < DOUBT * self.distance {
+            (self.own_index, self.own_distance)
+        } else {
+            (self.index, self.distance)
+        }
+    }
 }
 
 /// The nearest anchor of a feature (paper eq. 9), squared distances.
 fn nearest_anchor(p: &FieldParams, anchors: &[f32], feature: &[f32; 16], label: u32) -> Match {
-    let mut best =
-        Match { index: NO_ANCHOR, class: 255, distance: NO_DISTANCE, own_distance: NO_DISTANCE };
+    let mut best = Match {
+        index: NO_ANCHOR,
+        class: 255,
+        distance: NO_DISTANCE,
+        own_index: NO_ANCHOR,
+        own_distance: NO_DISTANCE,
+    };
     for (j, a) in anchors.chunks_exact(ANCHOR_FLOATS).take(p.anchors as usize).enumerate() {
         let class = a[16].to_bits();
         if class == 255 {
@@ -68,8 +89,8 @@ fn nearest_anchor(p: &FieldParams, anchors: &[f32], feature: &[f32; 16], label: 
         if distance < best.distance {
             (best.index, best.class, best.distance) = (j as u32, class, distance);
         }
-        if class == label {
-            best.own_distance = best.own_distance.min(distance);
+        if class == label && distance < best.own_distance {
+            (best.own_index, best.own_distance) = (j as u32, distance);
         }
     }
     best
@@ -172,12 +193,13 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             let mut loss_feature = 0.0;
             if !ray.masked() {
                 if p.weight_compression > 0.0 && matched.index != NO_ANCHOR {
-                    let anchor = &anchors[matched.index as usize * ANCHOR_FLOATS..];
+                    let (index, distance) = matched.held_by();
+                    let anchor = &anchors[index as usize * ANCHOR_FLOATS..];
                     for k in 0..16 {
                         let e = feature[k] - anchor[k];
                         dfeature[k] += 2.0 * p.weight_compression * inv_rays * e;
                     }
-                    loss_feature += p.weight_compression * matched.distance;
+                    loss_feature += p.weight_compression * distance;
                 }
                 if let Some(target) = fused_target(&p, targets, &ray) {
                     let weight = p.weight_feature * target[16];
