@@ -1,11 +1,9 @@
 //! Adds feature gradients into the appearance and semantic planes, fixed point.
+use super::CpuDispatch;
 use super::scatter_geometry::add_quanta;
 use super::shared::{Grid, Ray, plane_corners};
-use super::CpuDispatch;
-use crate::{
-    layout::{
-        FieldParams, RAY_STATE_FLOATS, STATE_APPEARANCE_GRADIENT, STATE_DEPTH, STATE_SEMANTIC_GRADIENT,
-    },
+use crate::layout::{
+    FieldParams, RAY_STATE_FLOATS, STATE_APPEARANCE_GRADIENT, STATE_DEPTH, STATE_SEMANTIC_GRADIENT,
 };
 
 kernel! {
@@ -42,9 +40,8 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         let (quad, id, part) = (job % 4, (job / 4) % rays, job / (4 * rays));
         let (plane, level, modality) = (part % 3, (part / 3) % 2, part / 6);
         let ray = Ray::load(ray_words, id);
-        let unlabelled = ray.class() >= p.classes
-            && p.weight_compression == 0.0
-            && p.weight_feature == 0.0;
+        let unlabelled =
+            ray.class() >= p.classes && p.weight_compression == 0.0 && p.weight_feature == 0.0;
         if ray.masked() || (modality == 1 && unlabelled) {
             return;
         }
@@ -66,8 +63,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                 add_quanta(targets[modality], status, first, &values, 1.0, p.contribution_limit);
             }
         };
-        let range =
-            ray_state[id * RAY_STATE_FLOATS + STATE_DEPTH as usize * 4 + 3] as usize;
+        let range = ray_state[id * RAY_STATE_FLOATS + STATE_DEPTH as usize * 4 + 3] as usize;
         for i in range / 256..range % 256 {
             let w = weights[id * n + i];
             if w <= p.min_weight {
