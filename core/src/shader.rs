@@ -26,6 +26,7 @@ pub const SHARED: &[(&str, &str)] = &[
     ("shared/rays.wgsl", include_str!("../../shaders/shared/rays.wgsl")),
     ("shared/semantic.wgsl", include_str!("../../shaders/shared/semantic.wgsl")),
     ("shared/surface.wgsl", include_str!("../../shaders/shared/surface.wgsl")),
+    ("shared/tokens.wgsl", include_str!("../../shaders/shared/tokens.wgsl")),
     ("shared/weights.wgsl", include_str!("../../shaders/shared/weights.wgsl")),
 ];
 

@@ -3,6 +3,7 @@
 use crate::{
     Compare, TestRandom, f32_words,
     fixture::{self, CLASSES, FRAMES, Options, POISON, State, words, workgroups},
+    tokens,
 };
 use mte_slam_core::{
     engine::Engine,
@@ -25,13 +26,14 @@ use mte_slam_core::{
         sample_rays::SAMPLE_RAYS,
         scatter_geometry::SCATTER_GEOMETRY,
         scatter_surface::SCATTER_SURFACE,
-        shared::{FLAG_DENSE, FLAG_GUIDED, FLAG_MAP, FLAG_MASK, FLAG_POSE},
+        shared::{FLAG_ANCHORS, FLAG_DENSE, FLAG_GUIDED, FLAG_MAP, FLAG_MASK, FLAG_POSE},
         weight_gradient::{WEIGHT_GRADIENT, WeightGradientParams},
     },
     layout::{
-        GEOMETRY_FLOATS, HEAD_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_APPEARANCE,
-        STATE_COLOR_DELTA, STATE_COLOR_HIDDEN, STATE_COLOR_HIDDEN_DELTA, STATE_FEATURE,
-        STATE_FEATURE_DELTA, STATE_SEMANTIC, STATE_SEMANTIC_HIDDEN, STATE_SEMANTIC_HIDDEN_DELTA,
+        ANCHOR_FLOATS, FEATURE, GEOMETRY_FLOATS, HEAD_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS,
+        STATE_ANCHOR, STATE_APPEARANCE, STATE_COLOR_DELTA, STATE_COLOR_HIDDEN,
+        STATE_COLOR_HIDDEN_DELTA, STATE_FEATURE, STATE_FEATURE_DELTA, STATE_SEMANTIC,
+        STATE_SEMANTIC_HIDDEN, STATE_SEMANTIC_HIDDEN_DELTA,
     },
 };
 
@@ -56,7 +58,7 @@ pub struct Case {
 /// How far the engines may be apart. Both compute in f32 with another order of sums and another
 /// exp, so: a few units of the last place (6e-8) times the number of terms behind a result
 /// (32 to 64 in a layer, three layers), relative to the largest value of the column.
-const SUMS: f32 = 2e-5;
+pub(crate) const SUMS: f32 = 2e-5;
 
 fn tolerance(name: &str) -> Compare {
     let columns = |row, bits, relative| Compare::Columns { row, bits, relative };
@@ -65,7 +67,8 @@ fn tolerance(name: &str) -> Compare {
         "rays" => columns(12, &[7, 11], 1e-6),
         // Class, and the mask.
         "ray_out" => columns(RAY_OUT_FLOATS, &[5, 11], SUMS),
-        "ray_state" => columns(RAY_STATE_FLOATS, &[], SUMS),
+        // Index of the nearest anchor.
+        "ray_state" => columns(RAY_STATE_FLOATS, &[STATE_ANCHOR as usize * 4], SUMS),
         "features" => columns(32, &[], SUMS),
         "position_gradient" => columns(4, &[], SUMS),
         "poses" => columns(12, &[], 1e-6),
@@ -194,6 +197,10 @@ pub fn cases(kernel: &str) -> Vec<Case> {
         "decode_rays" => vec![
             chained("classes", &DECODE_RAYS, &usual, &["ray_out", "logits_gradient"]),
             chained("no classes", &DECODE_RAYS, &classless, &["ray_out"]),
+            supervised("anchors", 19, FLAG_GUIDED | FLAG_MAP, 0.3, 0.0),
+            supervised("fused features", 0, FLAG_GUIDED | FLAG_MAP, 0.0, 0.7),
+            supervised("both", 19, FLAG_GUIDED | FLAG_MAP, 0.3, 0.7),
+            supervised("classes of anchors", 19, FLAG_DENSE | FLAG_ANCHORS, 0.0, 0.0),
         ],
         "mask_rays" => vec![
             case("tracking", &MASK_RAYS, &before(&MASK_RAYS, &tracking), &[]),
@@ -246,8 +253,47 @@ pub fn cases(kernel: &str) -> Vec<Case> {
         "pose_step" => pose_steps(&usual),
         "query_points" => query_points(),
         "reduce_partials" => reduce_partials(),
-        _ => Vec::new(),
+        _ => tokens::cases(kernel),
     }
+}
+
+/// `decode_rays` against anchors and fused features of the size of the rays' own features. Every
+/// fourth slot of anchors is free, and every third token has no weight.
+pub fn supervised(
+    name: &'static str,
+    anchors: u32,
+    flags: u32,
+    compression: f32,
+    feature: f32,
+) -> Case {
+    let mut state = before(&DECODE_RAYS, &Options { flags, ..Options::default() });
+    let mut decoded = state.clone();
+    decoded.run(&mut Engine::cpu(), &DECODE_RAYS);
+    let own = decoded.floats("ray_state");
+    let mut random = TestRandom(41);
+    let mut near = |ray: usize| -> Vec<u32> {
+        let at = ray * RAY_STATE_FLOATS + STATE_FEATURE as usize * 4;
+        f32_words(own[at..at + FEATURE].iter().map(|x| x * random.uniform(0.5, 1.5)))
+    };
+    let mut words = Vec::new();
+    for i in 0..anchors {
+        words.extend(near(4 * i as usize));
+        words.push(if i % 4 == 3 { 255 } else { i % CLASSES });
+        words.resize(words.len() + ANCHOR_FLOATS - FEATURE - 1, 0);
+    }
+    words.resize(words.len().max(4), 0);
+    state.buffers.insert("anchors", words);
+    let p = &mut state.params;
+    (p.anchors, p.weight_compression, p.weight_feature) = (anchors, compression, feature);
+    (p.token_size, p.token_columns, p.token_rows) = (8, p.width / 8, p.height / 8);
+    let mut words = Vec::new();
+    for token in 0..FRAMES * p.token_columns * p.token_rows {
+        words.extend(near(4 * token as usize));
+        words.push(if token % 3 == 2 { 0.0_f32 } else { 1.0 }.to_bits());
+        words.extend([0; 3]);
+    }
+    state.buffers.insert("targets", words);
+    case(name, &DECODE_RAYS, &state, &["ray_out", "logits_gradient"])
 }
 
 fn with_errors(name: &'static str, o: &Options, error: impl Fn(usize) -> f32) -> Case {

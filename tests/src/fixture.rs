@@ -102,10 +102,20 @@ pub fn pose(frame: u32) -> Pose {
     Pose::from_twist(&twist)
 }
 
-/// What a camera at `pose` sees of the room: depth with holes and a few depths beyond the map,
+/// What the camera at `pose` sees of the room: depth with holes and a few depths beyond the map,
 /// colours, and the wall as the class with some pixels unlabelled.
 pub fn frame(index: u32) -> Frame {
-    let (camera, pose) = (camera(), pose(index));
+    frame_of(&camera(), index)
+}
+
+/// A camera of 13 x 7 tokens of 8 pixels and a rest: more than a workgroup's 64.
+pub fn wide_camera() -> Camera {
+    Camera { width: 109, height: 59, fx: 62.0, fy: 65.0, cx: 52.3, cy: 30.1 }
+}
+
+/// As [`frame`], of another camera.
+pub fn frame_of(camera: &Camera, index: u32) -> Frame {
+    let pose = pose(index);
     let room = DVec3::new(0.7, 0.45, 0.8);
     let mut random = TestRandom(200 + u64::from(index));
     let (mut color, mut depth, mut labels) = (Vec::new(), Vec::new(), Vec::new());
@@ -257,6 +267,9 @@ impl State {
         zero("gradient_appearance", shape.surface_floats());
         zero("gradient_semantic", shape.surface_floats());
         zero("status", 4);
+        // Neither anchors nor fused features.
+        zero("anchors", 4);
+        zero("targets", 4);
         // Written in parts, by several kernels.
         zero("ray_state", rays * RAY_STATE_FLOATS);
         if o.classes == 0 {

@@ -74,11 +74,8 @@ fn layers(classes: u32, config: &FusionConfig) -> (Vec<Layer>, u32) {
     let mut add =
         |name, from_raw, input, inputs, output, outputs: u32, taps, kind: (bool, bool, bool)| {
             let (depthwise, activation, biased) = kind;
-            let room = if name == "gate" || name == "colour head" {
-                4.min(outputs.max(3) + 1)
-            } else {
-                outputs
-            };
+            // `token_loss` reads the colour head four columns wide; layers have no padding.
+            let room = if name == "colour head" { 4 } else { outputs };
             let mut layer = Layer {
                 name,
                 from_raw,

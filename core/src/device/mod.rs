@@ -203,8 +203,10 @@ impl Device {
     ) -> Result<Device, EngineError> {
         let e = &mut engine;
         let pixels = camera.pixels();
-        let fused = classes > 0 && config.fusion.enabled;
-        let targets = if fused { fusion::target_floats(&camera, &config.fusion) } else { 0 };
+        // An image smaller than a token has nothing to fuse.
+        let targets = fusion::target_floats(&camera, &config.fusion);
+        let fused = classes > 0 && config.fusion.enabled && targets > 0;
+        let targets = if fused { targets } else { 0 };
         let slot_bytes = pixels * 4 + pixels.div_ceil(2) * 4 + targets * 4;
         let by_limit = e.max_buffer_words() / pixels.max(targets);
         let slots = (config.keyframes.budget_mib as usize * (1 << 20) / slot_bytes)
@@ -377,6 +379,11 @@ impl Device {
     /// The rays' outputs of the last forward pass: [`RAY_OUT_FLOATS`] a ray.
     pub async fn read_ray_out(&mut self, rays: u32) -> Result<Vec<f32>, EngineError> {
         self.engine.read_as(self.ray_out, 0, rays as usize * RAY_OUT_FLOATS).await
+    }
+
+    /// What the rays of the last forward pass keep: [`RAY_STATE_FLOATS`] a ray.
+    pub async fn read_ray_state(&mut self, rays: u32) -> Result<Vec<f32>, EngineError> {
+        self.engine.read_as(self.ray_state, 0, rays as usize * RAY_STATE_FLOATS).await
     }
 
     /// Pose state of a slot after [`Device::record_pose_step`].

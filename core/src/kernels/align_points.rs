@@ -4,7 +4,7 @@ use super::shared::{
     geometry_feature_gradient, surface_weights,
 };
 use super::{CpuDispatch, store_f32};
-use crate::{layout::FieldParams};
+use crate::layout::FieldParams;
 
 /// Floats a workgroup writes.
 pub const ALIGN_ROW: usize = 32;

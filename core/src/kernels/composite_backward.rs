@@ -1,11 +1,9 @@
 //! Gradients at the signed distances: through the interval weights, and the distance losses.
 use super::shared::{FLAG_POSE, Grid, Ray, cross, phi};
 use super::{CpuDispatch, load_f32, store_f32};
-use crate::{
-    layout::{
-        FieldParams, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_APPEARANCE_GRADIENT, STATE_DEPTH,
-        STATE_POSE,
-    },
+use crate::layout::{
+    FieldParams, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_APPEARANCE_GRADIENT, STATE_DEPTH,
+    STATE_POSE,
 };
 
 kernel! {

@@ -1,18 +1,16 @@
 //! Decoders and class head on composited features; the losses of colour, classes, feature and
 //! compression; their gradients.
 use super::shared::{
-    FLAG_ANCHORS, Ray, class_logit, color_backward, color_hidden, color_output, head_row, semantic_backward,
-    semantic_hidden, semantic_output, surface_weights,
+    FLAG_ANCHORS, Ray, class_logit, color_backward, color_hidden, color_output, head_row,
+    semantic_backward, semantic_hidden, semantic_output, surface_weights,
 };
 use super::{CpuDispatch, load_f32, store_f32, store_u32};
-use crate::{
-    layout::{
-        ANCHOR_FLOATS, FieldParams, NO_ANCHOR, NO_DISTANCE, RAY_OUT_FLOATS, RAY_STATE_FLOATS,
-        STATE_ANCHOR, STATE_APPEARANCE, STATE_APPEARANCE_GRADIENT, TARGET_FLOATS,
-        STATE_COLOR_DELTA, STATE_COLOR_HIDDEN, STATE_COLOR_HIDDEN_DELTA, STATE_DEPTH,
-        STATE_FEATURE, STATE_FEATURE_DELTA, STATE_SEMANTIC, STATE_SEMANTIC_GRADIENT,
-        STATE_SEMANTIC_HIDDEN, STATE_SEMANTIC_HIDDEN_DELTA,
-    },
+use crate::layout::{
+    ANCHOR_FLOATS, FieldParams, NO_ANCHOR, NO_DISTANCE, RAY_OUT_FLOATS, RAY_STATE_FLOATS,
+    STATE_ANCHOR, STATE_APPEARANCE, STATE_APPEARANCE_GRADIENT, STATE_COLOR_DELTA,
+    STATE_COLOR_HIDDEN, STATE_COLOR_HIDDEN_DELTA, STATE_DEPTH, STATE_FEATURE, STATE_FEATURE_DELTA,
+    STATE_SEMANTIC, STATE_SEMANTIC_GRADIENT, STATE_SEMANTIC_HIDDEN, STATE_SEMANTIC_HIDDEN_DELTA,
+    TARGET_FLOATS,
 };
 use core::sync::atomic::AtomicU32;
 #[cfg(not(feature = "std"))]
@@ -211,7 +209,11 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                 }
             }
             let index = f32::from_bits(matched.index);
-            put(state, STATE_ANCHOR, &[index, matched.distance, matched.own_distance, loss_feature]);
+            put(
+                state,
+                STATE_ANCHOR,
+                &[index, matched.distance, matched.own_distance, loss_feature],
+            );
             let (dh, df) = semantic_backward(surface, &hidden, &dfeature);
             put(state, STATE_FEATURE, &feature);
             put(state, STATE_FEATURE_DELTA, &dfeature);

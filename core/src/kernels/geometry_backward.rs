@@ -3,7 +3,7 @@ use super::shared::{
     FLAG_MAP, FLAG_POSE, Grid, Ray, geometry_decoder, geometry_deltas, geometry_feature_gradient,
 };
 use super::{CpuDispatch, load_f32, store_f32};
-use crate::{layout::{BACKWARD_STRIP, FieldParams}};
+use crate::layout::{BACKWARD_STRIP, FieldParams};
 
 kernel! {
     /// Gradients at the plane features (over the features) and at the sample positions.

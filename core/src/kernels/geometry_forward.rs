@@ -1,7 +1,7 @@
 //! Signed distance at every sample.
 use super::shared::{FLAG_MAP, FLAG_POSE, Grid, Ray, geometry_decoder};
 use super::{CpuDispatch, store_f32};
-use crate::{layout::FieldParams};
+use crate::layout::FieldParams;
 
 kernel! {
     /// Plane look-up and geometry decoder at every sample.

@@ -1,9 +1,7 @@
 //! Gradient of the geometry decoder.
 use super::shared::{geometry_decoder, geometry_deltas};
 use super::{CpuDispatch, store_f32};
-use crate::{
-    layout::{FieldParams, GEOMETRY_FLOATS},
-};
+use crate::layout::{FieldParams, GEOMETRY_FLOATS};
 
 kernel! {
     /// Partial gradients of the geometry decoder, a row of 820 floats a workgroup. Samples come in

@@ -72,7 +72,9 @@ impl Set<'_> {
         load_u32(self.cell(i, 16))
     }
     fn distance(&self, i: usize, feature: impl Fn(usize) -> f32) -> f32 {
-        (0..FEATURE).map(|k| (self.value(i, k) - feature(k)) * (self.value(i, k) - feature(k))).sum()
+        (0..FEATURE)
+            .map(|k| (self.value(i, k) - feature(k)) * (self.value(i, k) - feature(k)))
+            .sum()
     }
     fn clear(&self, i: usize) {
         (0..ANCHOR_FLOATS).for_each(|k| store_u32(self.cell(i, k), 0));
@@ -159,8 +161,9 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         }
         let Some(ray) = chosen else { break };
         let class = Ray::load(ray_words, ray).class();
-        let feature =
-            |ray: usize, k: usize| load_f32(&state[ray * RAY_STATE_FLOATS + STATE_FEATURE as usize * 4 + k]);
+        let feature = |ray: usize, k: usize| {
+            load_f32(&state[ray * RAY_STATE_FLOATS + STATE_FEATURE as usize * 4 + k])
+        };
         set.clear(free);
         for k in 0..FEATURE {
             store_f32(set.cell(free, k), feature(ray, k));

@@ -1,8 +1,6 @@
 //! Takes outliers out of the tracking losses.
 use super::{CpuDispatch, load_f32, store_f32};
-use crate::{
-    layout::{FieldParams, RAY_OUT_FLOATS},
-};
+use crate::layout::{FieldParams, RAY_OUT_FLOATS};
 
 kernel! {
     /// Masks rays without depth and those whose depth error exceeds ten times the median.

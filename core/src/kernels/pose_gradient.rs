@@ -1,9 +1,7 @@
 //! Sums the gradients at a ray's sample positions into its pose gradient.
 use super::shared::{Ray, cross};
 use super::{CpuDispatch, load_f32, store_f32};
-use crate::{
-    layout::{FieldParams, RAY_STATE_FLOATS, STATE_POSE},
-};
+use crate::layout::{FieldParams, RAY_STATE_FLOATS, STATE_POSE};
 
 kernel! {
     /// Pose gradient of each ray: translation, and rotation about the camera's centre.

@@ -1,9 +1,7 @@
 //! One Adam step on the pose of each window frame.
 use super::shared::cross;
 use super::{CpuDispatch, load_f32, store_f32};
-use crate::{
-    layout::{RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_POSE},
-};
+use crate::layout::{RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_POSE};
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 

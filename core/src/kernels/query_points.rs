@@ -4,7 +4,7 @@ use super::shared::{
     semantic_output, surface_weights,
 };
 use super::{CpuDispatch, store_f32, store_u32};
-use crate::{layout::FieldParams};
+use crate::layout::FieldParams;
 
 kernel! {
     /// Signed distance \[truncations\] at points; with `FLAG_MAP` colour and class too.

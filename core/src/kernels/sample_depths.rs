@@ -3,9 +3,7 @@ use super::shared::{
     FLAG_DENSE, FLAG_GUIDED, Grid, Ray, geometry_decoder, interval_alpha, phi, random_f32,
 };
 use super::{CpuDispatch, store_f32};
-use crate::{
-    layout::{FieldParams, MAX_STRATIFIED},
-};
+use crate::layout::{FieldParams, MAX_STRATIFIED};
 
 kernel! {
     /// Places the samples of each ray, sorted.

@@ -2,7 +2,7 @@
 use super::adam::STATUS_SATURATED;
 use super::shared::{Grid, Ray, plane_corners};
 use super::{CpuDispatch, add_i32, or_u32};
-use crate::{layout::FieldParams};
+use crate::layout::FieldParams;
 use core::sync::atomic::AtomicU32;
 
 kernel! {

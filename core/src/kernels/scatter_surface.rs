@@ -1,11 +1,9 @@
 //! Adds feature gradients into the appearance and semantic planes, fixed point.
+use super::CpuDispatch;
 use super::scatter_geometry::add_quanta;
 use super::shared::{Grid, Ray, plane_corners};
-use super::CpuDispatch;
-use crate::{
-    layout::{
-        FieldParams, RAY_STATE_FLOATS, STATE_APPEARANCE_GRADIENT, STATE_DEPTH, STATE_SEMANTIC_GRADIENT,
-    },
+use crate::layout::{
+    FieldParams, RAY_STATE_FLOATS, STATE_APPEARANCE_GRADIENT, STATE_DEPTH, STATE_SEMANTIC_GRADIENT,
 };
 
 kernel! {
@@ -67,8 +65,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                 add_quanta(targets[modality], status, first, &values, 1.0, p.contribution_limit);
             }
         };
-        let range =
-            ray_state[id * RAY_STATE_FLOATS + STATE_DEPTH as usize * 4 + 3] as usize;
+        let range = ray_state[id * RAY_STATE_FLOATS + STATE_DEPTH as usize * 4 + 3] as usize;
         for i in range / 256..range % 256 {
             let w = weights[id * n + i];
             if w <= p.min_weight {

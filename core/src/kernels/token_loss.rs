@@ -83,7 +83,13 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             let y = sigmoid(z);
             let e = y - raw[RAW_MEAN as usize + k];
             loss += p.weight_color * e.abs() / 3.0;
-            let sign = if e > 0.0 { 1.0 } else if e < 0.0 { -1.0 } else { 0.0 };
+            let sign = if e > 0.0 {
+                1.0
+            } else if e < 0.0 {
+                -1.0
+            } else {
+                0.0
+            };
             let d = p.weight_color * inv / 3.0 * sign * y * (1.0 - y);
             store_f32(&tokens[row + COLOR_AT as usize + k], y);
             store_f32(&gradient[row + COLOR_AT as usize + k], d);

@@ -1,8 +1,6 @@
 //! Anchors follow the features matched to them (paper eqs. 11, 12).
 use super::{CpuDispatch, load_f32, shared::Ray, store_f32, store_u32};
-use crate::layout::{
-    ANCHOR_FLOATS, FEATURE, RAY_STATE_FLOATS, STATE_ANCHOR, STATE_FEATURE,
-};
+use crate::layout::{ANCHOR_FLOATS, FEATURE, RAY_STATE_FLOATS, STATE_ANCHOR, STATE_FEATURE};
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 

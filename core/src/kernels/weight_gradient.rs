@@ -1,6 +1,6 @@
 //! Gradients of the decoders that run once a ray.
 use super::{CpuDispatch, store_f32};
-use crate::{layout::RAY_STATE_FLOATS};
+use crate::layout::RAY_STATE_FLOATS;
 
 params! {
     /// Parameters of [`WEIGHT_GRADIENT`].

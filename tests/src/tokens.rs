@@ -1,0 +1,742 @@
+//! Cases of the kernels on the token grid and of the anchors. Activations are random, so that every
+//! column of a token's row differs, and grids have more columns than rows and no multiple of a
+//! workgroup's tokens.
+use crate::{
+    Compare, TestRandom,
+    cases::{Case, SUMS},
+    f32_words, fixture,
+    fixture::{CLASSES, POISON, words},
+};
+use mte_slam_core::{
+    engine::Engine,
+    kernels::{
+        Kernel,
+        attend_keys::ATTEND_KEYS,
+        attend_queries::ATTEND_QUERIES,
+        attend_tokens::ATTEND_TOKENS,
+        extract_tokens::EXTRACT_TOKENS,
+        gate_backward::GATE_BACKWARD,
+        gate_tokens::GATE_TOKENS,
+        maintain_anchors::{MAINTAIN_ANCHORS, MaintainAnchorsParams},
+        shared::{RAY_MASKED, Ray},
+        token_layer::TOKEN_LAYER,
+        token_layer_backward::TOKEN_LAYER_BACKWARD,
+        token_loss::TOKEN_LOSS,
+        token_weights::TOKEN_WEIGHTS,
+        tokens::{
+            APPEARANCE_AT, COLOR_AT, DEPTHWISE_AT, FIRST_AT, FUSED_AT, GATE_AT, GEOMETRY_AT,
+            GEOMETRY_INPUTS, GUIDED_AT, HIDDEN, HIDDEN_AT, LOCAL_AT, LOGITS_AT, NO_BIAS,
+            NO_RESIDUAL, PATCH_INPUTS, RAW_GEOMETRY, RAW_HISTOGRAM, RAW_MEAN, RAW_PATCH,
+            REFINED_AT, SECOND_AT, SEMANTIC_AT, STATISTICS_AT, TILE, TokenParams,
+        },
+        update_anchors::{UPDATE_ANCHORS, UpdateAnchorsParams},
+    },
+    layout::{
+        ANCHOR_FLOATS, FEATURE, NO_ANCHOR, NO_DISTANCE, RAY_STATE_FLOATS, STATE_ANCHOR,
+        STATE_FEATURE, TARGET_FLOATS,
+    },
+    recording::workgroups_1d,
+};
+
+/// Parameters of a grid, without a layer.
+fn grid(columns: u32, rows: u32) -> TokenParams {
+    let padded = CLASSES.next_multiple_of(4);
+    TokenParams {
+        columns,
+        rows,
+        stride: LOGITS_AT + padded,
+        raw_stride: RAW_HISTOGRAM + padded,
+        size: 8,
+        classes: CLASSES,
+        key_stride: 1,
+        residual: NO_RESIDUAL,
+        bias: NO_BIAS,
+        taps: 1,
+        chunk: 13,
+        ..TokenParams::default()
+    }
+}
+
+/// 117 tokens: two workgroups, the second not full.
+fn usual() -> TokenParams {
+    grid(13, 9)
+}
+
+fn random(floats: usize, seed: u64, size: f32) -> Vec<u32> {
+    let mut random = TestRandom(seed);
+    f32_words((0..floats).map(|_| random.uniform(-size, size)))
+}
+
+fn tokens(p: &TokenParams, seed: u64) -> Vec<u32> {
+    random(p.tokens() * p.stride as usize, seed, 1.0)
+}
+
+fn tolerance(p: &TokenParams, kernel: &Kernel) -> Vec<Compare> {
+    let columns = |row: u32| Compare::Columns { row: row as usize, bits: &[], relative: SUMS };
+    let one = |name| match name {
+        "tokens" | "token_gradient" => columns(p.stride),
+        "raw" => columns(p.raw_stride),
+        "partials" => Compare::Columns { row: 1, bits: &[], relative: SUMS },
+        // Targets are copies.
+        _ => Compare::U32,
+    };
+    kernel.bindings.iter().map(|binding| one(binding.name)).collect()
+}
+
+fn token_case(
+    name: &'static str,
+    kernel: &'static Kernel,
+    p: &TokenParams,
+    buffers: Vec<Vec<u32>>,
+    invocations: usize,
+) -> Case {
+    Case {
+        name,
+        kernel,
+        params: words(p),
+        buffers,
+        workgroups: workgroups_1d(invocations, kernel.workgroup_size),
+        tolerance: tolerance(p, kernel),
+        overwritten: Vec::new(),
+    }
+}
+
+/// The buffers after a case, by the twin.
+fn after(case: &Case) -> Vec<Vec<u32>> {
+    let mut engine = Engine::cpu();
+    fixture::run_words(&mut engine, case.kernel, &case.params, &case.buffers, case.workgroups)
+        .expect("a dispatch of the fixture")
+}
+
+/// The two attentions of the fusion, with and without residual, and what only shows at another
+/// grid: keys left out, one tile, several tiles, peaked weights.
+fn attentions() -> Vec<(&'static str, TokenParams, Vec<u32>)> {
+    let first =
+        |p| TokenParams { query: FIRST_AT, output: GUIDED_AT, statistics: STATISTICS_AT, ..p };
+    let second = |p, residual| TokenParams {
+        query: SECOND_AT,
+        output: REFINED_AT,
+        statistics: STATISTICS_AT + 1,
+        residual,
+        ..p
+    };
+    let half = TokenParams { key_stride: 2, ..usual() };
+    let usual = usual();
+    let one_tile = grid(5, 3);
+    let wide = TokenParams { key_stride: 3, ..grid(31, 7) };
+    let mut peaked = tokens(&usual, 305);
+    for row in peaked.chunks_exact_mut(usual.stride as usize) {
+        for word in &mut row[FIRST_AT as usize..FIRST_AT as usize + 32] {
+            *word = (f32::from_bits(*word) * 4.0).to_bits();
+        }
+    }
+    vec![
+        ("first", first(usual), tokens(&usual, 301)),
+        ("residual", second(usual, APPEARANCE_AT), tokens(&usual, 302)),
+        ("no residual", second(usual, NO_RESIDUAL), tokens(&usual, 303)),
+        ("every other key", first(half), tokens(&usual, 304)),
+        ("every other key and residual", second(half, APPEARANCE_AT), tokens(&usual, 305)),
+        ("every third key", first(wide), tokens(&wide, 306)),
+        ("one tile", second(one_tile, APPEARANCE_AT), tokens(&one_tile, 307)),
+        ("peaked", first(usual), peaked),
+    ]
+}
+
+fn groups(n: usize) -> usize {
+    n.div_ceil(TILE) * TILE
+}
+
+fn attend_tokens() -> Vec<Case> {
+    let mut cases: Vec<Case> = attentions()
+        .into_iter()
+        .map(|(name, p, tokens)| {
+            token_case(name, &ATTEND_TOKENS, &p, vec![tokens], groups(p.tokens()))
+        })
+        .collect();
+    // As large as a frame of 1024 x 640 pixels. Rows of this kernel's columns only.
+    let p = TokenParams { stride: 68, query: 0, output: 48, statistics: 64, ..grid(128, 80) };
+    cases.push(token_case(
+        "a whole frame",
+        &ATTEND_TOKENS,
+        &p,
+        vec![tokens(&p, 308)],
+        groups(p.tokens()),
+    ));
+    cases
+}
+
+/// Tokens after the attention, and gradients of everything.
+fn attended(p: &TokenParams, tokens: Vec<u32>) -> Vec<Vec<u32>> {
+    let forward = token_case("", &ATTEND_TOKENS, p, vec![tokens], groups(p.tokens()));
+    let mut buffers = after(&forward);
+    buffers.push(random(buffers[0].len(), 311, 1.0));
+    buffers
+}
+
+fn attend_queries() -> Vec<Case> {
+    attentions()
+        .into_iter()
+        .map(|(name, p, tokens)| {
+            let n = groups(p.tokens());
+            token_case(name, &ATTEND_QUERIES, &p, attended(&p, tokens), n)
+        })
+        .collect()
+}
+
+fn attend_keys() -> Vec<Case> {
+    attentions()
+        .into_iter()
+        .map(|(name, p, tokens)| {
+            let queries =
+                token_case("", &ATTEND_QUERIES, &p, attended(&p, tokens), groups(p.tokens()));
+            token_case(name, &ATTEND_KEYS, &p, after(&queries), groups(p.keys()))
+        })
+        .collect()
+}
+
+fn raw(p: &TokenParams, seed: u64) -> Vec<u32> {
+    let mut random = TestRandom(seed);
+    let mut raw = Vec::new();
+    for token in 0..p.tokens() {
+        let row = raw.len();
+        raw.extend((0..RAW_MEAN).map(|_| random.uniform(-1.0, 1.0)));
+        raw.extend((RAW_MEAN..RAW_HISTOGRAM).map(|_| random.uniform(0.0, 1.0)));
+        // Whether the token has geometry.
+        raw[row + RAW_HISTOGRAM as usize - 1] =
+            if random.bits().is_multiple_of(4) { 0.0 } else { 1.0 };
+        raw.resize(row + p.raw_stride as usize, 0.0);
+        // Every fourth token has no labels at all, others some of their pixels.
+        if token % 4 != 3 {
+            let at = row + RAW_HISTOGRAM as usize;
+            raw[at + token % CLASSES as usize] = random.uniform(0.2, 0.7);
+            raw[at + token * 7 % CLASSES as usize] += random.uniform(0.0, 0.3);
+        }
+    }
+    f32_words(raw)
+}
+
+/// Layers of each kind: from raw inputs, linear, 3 x 3 (its outputs no multiple of 4), depthwise;
+/// with bias and without, with rectifier and without.
+fn layers() -> Vec<(&'static str, TokenParams)> {
+    let layer = |raw: u32, input: u32, inputs: u32, output: u32, outputs: u32| TokenParams {
+        from_raw: raw,
+        input,
+        inputs,
+        output,
+        outputs,
+        weights: 5,
+        input_stride: outputs,
+        output_stride: 1,
+        ..usual()
+    };
+    let bias = |p: TokenParams| TokenParams {
+        bias: p.weights
+            + p.taps * p.taps * p.inputs * if p.depthwise == 1 { 1 } else { p.outputs }
+            + 2,
+        ..p
+    };
+    let rectified = |p| TokenParams { activation: 1, ..p };
+    let wide = |p| TokenParams { taps: 3, ..p };
+    let depthwise = |p| TokenParams { depthwise: 1, taps: 3, ..p };
+    let local = layer(0, GUIDED_AT, 16, DEPTHWISE_AT, 16);
+    vec![
+        ("raw", rectified(bias(layer(1, RAW_GEOMETRY, GEOMETRY_INPUTS, HIDDEN_AT, HIDDEN)))),
+        ("histogram", layer(1, RAW_HISTOGRAM, CLASSES, SEMANTIC_AT, 16)),
+        ("patch", bias(layer(1, RAW_PATCH, PATCH_INPUTS, APPEARANCE_AT, 16))),
+        ("linear", bias(layer(0, HIDDEN_AT, HIDDEN, GEOMETRY_AT, 16))),
+        ("linear without bias", layer(0, GEOMETRY_AT, 16, FIRST_AT, 16)),
+        ("linear, rectified", rectified(bias(layer(0, DEPTHWISE_AT, 16, LOCAL_AT, 16)))),
+        ("3 x 3", bias(wide(layer(0, GEOMETRY_AT, 48, GATE_AT, 3)))),
+        ("3 x 3, rectified", rectified(wide(layer(0, DEPTHWISE_AT, 16, LOCAL_AT, 16)))),
+        ("depthwise", rectified(bias(depthwise(local)))),
+        ("depthwise without bias", depthwise(local)),
+    ]
+}
+
+fn token_layer() -> Vec<Case> {
+    layers()
+        .into_iter()
+        .map(|(name, p)| {
+            let buffers = vec![random(8000, 321, 0.5), raw(&p, 322), tokens(&p, 323)];
+            let jobs = p.tokens() * p.outputs.div_ceil(4) as usize;
+            token_case(name, &TOKEN_LAYER, &p, buffers, jobs)
+        })
+        .collect()
+}
+
+fn token_layer_backward() -> Vec<Case> {
+    layers()
+        .into_iter()
+        .filter(|(_, p)| p.from_raw == 0)
+        .map(|(name, p)| {
+            let tokens = tokens(&p, 323);
+            let gradient = random(tokens.len(), 324, 1.0);
+            let buffers = vec![random(8000, 321, 0.5), tokens, gradient];
+            let jobs = p.tokens() * p.inputs as usize;
+            token_case(name, &TOKEN_LAYER_BACKWARD, &p, buffers, jobs)
+        })
+        .collect()
+}
+
+fn token_weights() -> Vec<Case> {
+    // The class head's weights are stored output-major.
+    let head = TokenParams {
+        input: FUSED_AT,
+        inputs: 16,
+        output: LOGITS_AT,
+        outputs: CLASSES,
+        bias: CLASSES * 16,
+        input_stride: 1,
+        output_stride: 16,
+        ..usual()
+    };
+    // Rows with room for a fourth output that there is not.
+    let color = TokenParams {
+        input: FUSED_AT,
+        inputs: 16,
+        output: COLOR_AT,
+        outputs: 3,
+        bias: 64,
+        input_stride: 4,
+        output_stride: 1,
+        chunk: 40,
+        ..usual()
+    };
+    let mut layers = layers();
+    layers.extend([("class head", head), ("colour head", color)]);
+    layers
+        .into_iter()
+        .map(|(name, p)| {
+            let tokens = tokens(&p, 331);
+            let gradient = random(tokens.len(), 332, 1.0);
+            let p = TokenParams { row: 8000, ..p };
+            let chunks = p.tokens().div_ceil(p.chunk as usize);
+            // Each layer writes its part only.
+            let partials = vec![0; chunks * p.row as usize];
+            let quads = p.outputs.div_ceil(4) as usize;
+            let jobs = (p.taps * p.taps * p.inputs) as usize
+                * if p.depthwise == 1 { 1 } else { quads }
+                + if p.bias == NO_BIAS { 0 } else { quads };
+            let buffers = vec![raw(&p, 333), tokens, gradient, partials];
+            token_case(name, &TOKEN_WEIGHTS, &p, buffers, jobs * chunks)
+        })
+        .collect()
+}
+
+fn gate(p: &TokenParams) -> Case {
+    let mut tokens = tokens(p, 341);
+    // Gates from closed to open.
+    for (i, row) in tokens.chunks_exact_mut(p.stride as usize).enumerate() {
+        let gate = &mut row[GATE_AT as usize..GATE_AT as usize + 3];
+        gate.rotate_left(i % 3);
+        gate[0] = (f32::from_bits(gate[0]) * 6.0).to_bits();
+    }
+    token_case("gates", &GATE_TOKENS, p, vec![tokens], p.tokens())
+}
+
+fn gate_backward() -> Vec<Case> {
+    let one = |name, p: TokenParams| {
+        let mut buffers = after(&gate(&p));
+        buffers.push(random(buffers[0].len(), 342, 1.0));
+        token_case(name, &GATE_BACKWARD, &p, buffers, p.tokens())
+    };
+    vec![one("gates", usual()), one("few tokens", grid(5, 2))]
+}
+
+fn token_loss() -> Vec<Case> {
+    let one = |name, train, unlabelled, p: TokenParams| {
+        let p = TokenParams {
+            train,
+            slot: 1,
+            weight_class: 0.7,
+            weight_color: 0.4,
+            color_head: 9,
+            ..p
+        };
+        let tokens = tokens(&p, 351);
+        let mut raw = raw(&p, 352);
+        if unlabelled {
+            for row in raw.chunks_exact_mut(p.raw_stride as usize) {
+                row[RAW_HISTOGRAM as usize..].fill(0);
+            }
+        }
+        let gradient = random(tokens.len(), 353, 0.1);
+        let buffers = vec![
+            random(100, 354, 0.5),
+            f32_words(fixture::decoders(CLASSES)),
+            f32_words([0.5, 1.0, 2.0, 0.25, 1.5]),
+            raw,
+            tokens,
+            gradient,
+            vec![0; 3 * p.tokens() * TARGET_FLOATS],
+        ];
+        token_case(name, &TOKEN_LOSS, &p, buffers, p.tokens())
+    };
+    vec![
+        one("train", 1, false, usual()),
+        one("targets only", 0, false, usual()),
+        one("no labels", 1, true, usual()),
+        one("few tokens", 1, false, grid(4, 2)),
+    ]
+}
+
+/// Slots of images with smooth depth, holes in depth, and labels of which some are no class.
+fn extract_tokens() -> Vec<Case> {
+    let one = |name, width: u32, height: u32, size: u32, depth: &dyn Fn(u32, u32) -> u32| {
+        let slots = 3;
+        let mut random = TestRandom(361);
+        let (mut colors, mut depths) = (Vec::new(), Vec::new());
+        for _ in 0..slots {
+            let mut image = Vec::new();
+            for pixel in 0..width * height {
+                let (u, v) = (pixel % width, pixel / width);
+                let label = match random.bits() % 8 {
+                    0 => 255,
+                    1 => CLASSES + 1,
+                    _ => (u / 5 + v / 7) % CLASSES,
+                };
+                colors.push(random.bits() & 0xff_ffff | label << 24);
+                let hole = random.bits().is_multiple_of(3);
+                image.push(if hole { 0 } else { depth(u, v) });
+            }
+            depths
+                .extend(image.chunks(2).map(|d| d[0] | d.get(1).map_or(0, |second| second << 16)));
+        }
+        let poses = (0..slots).flat_map(|i| mte_slam_core::device::pose_words(&fixture::pose(i)));
+        let p = TokenParams {
+            width,
+            height,
+            size,
+            slot: 1,
+            fx: 17.0,
+            fy: 18.0,
+            cx: 11.7,
+            cy: 9.2,
+            box_min: [-2.0, -1.5, -1.0, 0.0],
+            depth_unit: 0.001,
+            ..grid(width / size, height / size)
+        };
+        let raw = vec![POISON; p.tokens() * p.raw_stride as usize];
+        let buffers = vec![f32_words(poses), colors, depths, raw];
+        let mut case = token_case(name, &EXTRACT_TOKENS, &p, buffers, p.tokens());
+        case.overwritten = vec!["raw"];
+        case
+    };
+    let slope = |u: u32, v: u32| 900 + 13 * u + 7 * v;
+    vec![
+        one("small image", 25, 19, 8, &slope),
+        one("odd image", 75, 67, 8, &slope),
+        one("tokens of 16", 75, 67, 16, &slope),
+        one("half an image", 75, 67, 8, &|u, v| if u > 40 { 0 } else { slope(u, v) }),
+    ]
+}
+
+/// Slots of anchors.
+const ANCHORS: u32 = 21;
+
+/// An anchor before it is words.
+#[derive(Clone, Copy)]
+struct Anchor {
+    class: u32,
+    matches: f32,
+    importance: f32,
+    variation: f32,
+    age: f32,
+}
+
+const SETTLED: Anchor =
+    Anchor { class: 0, matches: 30.0, importance: 9.0, variation: 0.01, age: 50.0 };
+
+fn anchor_words(vector: impl Iterator<Item = f32>, a: Anchor) -> Vec<u32> {
+    let mut words = f32_words(vector);
+    words.push(a.class);
+    words.extend(f32_words([a.matches, a.importance, a.variation, a.age, 0.0, 0.0, 0.0]));
+    assert_eq!(words.len(), ANCHOR_FLOATS);
+    words
+}
+
+/// Rays with labels (some unlabelled) and masks, and features spread out by `size`.
+fn labelled_rays(count: usize, classes: u32, size: f32) -> (Vec<Ray>, Vec<[f32; FEATURE]>) {
+    let mut random = TestRandom(371);
+    (0..count as u32)
+        .map(|i| {
+            let class = if random.bits().is_multiple_of(9) { 255 } else { random.bits() % classes };
+            let mask = if random.bits().is_multiple_of(7) { RAY_MASKED } else { 0 };
+            let ray = Ray {
+                depth: random.uniform(0.5, 2.0),
+                frame: 1 | 2 << 8 | mask,
+                label: class | i << 8,
+                ..Ray::default()
+            };
+            (ray, core::array::from_fn(|_| random.uniform(-size, size)))
+        })
+        .unzip()
+}
+
+/// What `decode_rays` leaves of rays and features: the nearest anchor, and the distances.
+fn matched(rays: &[Ray], features: &[[f32; FEATURE]], anchors: &[u32]) -> Vec<u32> {
+    let mut state = random(rays.len() * RAY_STATE_FLOATS, 372, 1.0);
+    for ((ray, feature), row) in
+        rays.iter().zip(features).zip(state.chunks_exact_mut(RAY_STATE_FLOATS))
+    {
+        let (mut best, mut any, mut own) = (NO_ANCHOR, NO_DISTANCE, NO_DISTANCE);
+        for (i, a) in anchors.chunks_exact(ANCHOR_FLOATS).enumerate() {
+            if a[16] == 255 {
+                continue;
+            }
+            let d: f32 = (0..FEATURE).map(|k| (feature[k] - f32::from_bits(a[k])).powi(2)).sum();
+            if d < any {
+                (best, any) = (i as u32, d);
+            }
+            if a[16] == ray.class() {
+                own = own.min(d);
+            }
+        }
+        let at = STATE_ANCHOR as usize * 4;
+        row[at..at + 4].copy_from_slice(&[best, any.to_bits(), own.to_bits(), 0]);
+        let at = STATE_FEATURE as usize * 4;
+        row[at..at + FEATURE].copy_from_slice(&f32_words(*feature));
+    }
+    state
+}
+
+fn ray_words(rays: &[Ray]) -> Vec<u32> {
+    rays.iter().flat_map(Ray::words).collect()
+}
+
+/// Vote counts of each anchor and class.
+fn votes(anchors: u32) -> Vec<u32> {
+    let mut random = TestRandom(373);
+    f32_words((0..anchors * CLASSES).map(|_| random.uniform(0.0, 2.0)))
+}
+
+fn anchor_tolerance(kernel: &Kernel) -> Vec<Compare> {
+    let one = |name| match name {
+        "anchors" => Compare::Columns { row: ANCHOR_FLOATS, bits: &[16], relative: SUMS },
+        "votes" => Compare::Columns { row: CLASSES as usize, bits: &[], relative: SUMS },
+        "ray_state" => Compare::Columns {
+            row: RAY_STATE_FLOATS,
+            bits: &[STATE_ANCHOR as usize * 4],
+            relative: SUMS,
+        },
+        _ => Compare::U32,
+    };
+    kernel.bindings.iter().map(|binding| one(binding.name)).collect()
+}
+
+fn update_anchors() -> Vec<Case> {
+    let one = |name, rays: usize, rule, beta, memory| {
+        let (rays, features) = labelled_rays(rays, CLASSES, 1.0);
+        let mut random = TestRandom(381);
+        let mut anchors = Vec::new();
+        for i in 0..ANCHORS {
+            let vector: Vec<f32> = (0..FEATURE).map(|_| random.uniform(-0.6, 0.6)).collect();
+            // Every fifth slot is free.
+            let class = if i % 5 == 4 { 255 } else { i % CLASSES };
+            let matches = random.uniform(0.0, 50.0);
+            anchors.extend(anchor_words(vector.into_iter(), Anchor { class, matches, ..SETTLED }));
+        }
+        let p = UpdateAnchorsParams {
+            rays: rays.len() as u32,
+            anchors: ANCHORS,
+            classes: CLASSES,
+            rule,
+            beta,
+            memory,
+            decay: 0.9,
+            variation_decay: 0.8,
+        };
+        let state = matched(&rays, &features, &anchors);
+        Case {
+            name,
+            kernel: &UPDATE_ANCHORS,
+            params: words(&p),
+            buffers: vec![ray_words(&rays), state, anchors, votes(ANCHORS)],
+            workgroups: [ANCHORS, 1, 1],
+            tolerance: anchor_tolerance(&UPDATE_ANCHORS),
+            overwritten: Vec::new(),
+        }
+    };
+    vec![
+        one("running mean", 300, 1, 0.05, 1000.0),
+        one("moving average", 300, 0, 0.05, 1000.0),
+        one("full memory", 300, 1, 0.05, 20.0),
+        one("few rays", 20, 0, 1.0, 1000.0),
+    ]
+}
+
+/// What a maintenance case is about: which slot holds what, and how many anchors may spawn.
+struct Maintenance {
+    name: &'static str,
+    /// Vector (a multiple of ones) and the rest, by slot; other slots are free.
+    anchors: Vec<(f32, Anchor)>,
+    slots: u32,
+    spawns: u32,
+    spawn_distance: f32,
+    /// Classes of the rays' labels.
+    labels: u32,
+}
+
+/// Cases of `maintain_anchors`, with what they must do: (alive, spawned, dropped, merged).
+pub fn maintenance() -> Vec<(Case, [u32; 4])> {
+    let (class, weak) = (|class| Anchor { class, ..SETTLED }, 0.5);
+    let unimportant = |c| Anchor { importance: weak, ..class(c) };
+    let young = |c| Anchor { age: 3.0, ..class(c) };
+    let moving = |c| Anchor { variation: 0.5, ..class(c) };
+    // Vectors differ by 0.01 * 4 in length within a group, by 4 and more between groups.
+    let plain = |name, anchors| Maintenance {
+        name,
+        anchors,
+        slots: ANCHORS,
+        spawns: 0,
+        spawn_distance: 1e9,
+        labels: CLASSES,
+    };
+    let far = vec![(9.0, class(0)), (-9.0, class(1)), (19.0, class(2))];
+    let all_classes: Vec<_> = (0..CLASSES).map(|c| (0.1 * c as f32, class(c))).collect();
+    vec![
+        // Three of class 0 go until one is left; the only one of class 1 and a young one stay.
+        (
+            plain(
+                "drop",
+                vec![
+                    (1.0, unimportant(0)),
+                    (2.0, unimportant(0)),
+                    (3.0, unimportant(0)),
+                    (4.0, unimportant(1)),
+                    (5.0, Anchor { age: 3.0, ..unimportant(2) }),
+                    (6.0, class(2)),
+                    (7.0, unimportant(2)),
+                ],
+            ),
+            [4, 0, 3, 0],
+        ),
+        // Three duplicates of class 0 and two of class 3 become one each. Not so: another class,
+        // a moving one, a young one.
+        (
+            plain(
+                "merge",
+                vec![
+                    (1.0, class(0)),
+                    (1.01, class(1)),
+                    (1.02, Anchor { matches: 90.0, ..class(0) }),
+                    (5.0, class(3)),
+                    (0.99, class(0)),
+                    (1.01, moving(0)),
+                    (1.01, young(0)),
+                    (5.01, Anchor { matches: 0.0, importance: 3.0, ..class(3) }),
+                ],
+            ),
+            [5, 0, 0, 3],
+        ),
+        // Every class's first anchor.
+        (
+            Maintenance { spawns: 7, spawn_distance: 1e6, ..plain("first anchors", vec![]) },
+            [CLASSES, CLASSES, 0, 0],
+        ),
+        // Features far from their class's anchors, as many as may.
+        (Maintenance { spawns: 6, spawn_distance: 1.0, ..plain("spawn", far) }, [9, 6, 0, 0]),
+        // Only so many slots are free.
+        (
+            Maintenance {
+                spawns: 8,
+                spawn_distance: 1.0,
+                slots: CLASSES + 2,
+                ..plain("few free slots", all_classes.clone())
+            },
+            [CLASSES + 2, 2, 0, 0],
+        ),
+        (
+            Maintenance {
+                spawns: 8,
+                spawn_distance: 1.0,
+                slots: CLASSES,
+                ..plain("full", all_classes.clone())
+            },
+            [CLASSES, 0, 0, 0],
+        ),
+        // One drops, two merge, and their slots are used again.
+        (
+            Maintenance {
+                spawns: 3,
+                spawn_distance: 1.0,
+                slots: 6,
+                ..plain(
+                    "everything",
+                    vec![
+                        (0.0, class(0)),
+                        (3.0, unimportant(0)),
+                        (0.01, class(0)),
+                        (5.0, class(1)),
+                        (5.01, class(1)),
+                        (2.0, class(2)),
+                    ],
+                )
+            },
+            [6, 3, 1, 2],
+        ),
+        // Nothing is far from its class.
+        (
+            Maintenance { spawns: 8, spawn_distance: 1e6, ..plain("close", all_classes) },
+            [CLASSES, 0, 0, 0],
+        ),
+    ]
+    .into_iter()
+    .map(|(m, counts)| (maintenance_case(&m), counts))
+    .collect()
+}
+
+fn maintenance_case(m: &Maintenance) -> Case {
+    let (rays, features) = labelled_rays(150, m.labels, 1.0);
+    let mut random = TestRandom(391);
+    let mut anchors = Vec::new();
+    for slot in 0..m.slots as usize {
+        let (at, a) = m.anchors.get(slot).copied().unwrap_or((
+            0.0,
+            Anchor { class: 255, matches: 0.0, importance: 0.0, variation: 0.0, age: 0.0 },
+        ));
+        let vector: Vec<f32> = (0..FEATURE).map(|_| at + random.uniform(-0.001, 0.001)).collect();
+        anchors.extend(anchor_words(vector.into_iter(), a));
+    }
+    let p = MaintainAnchorsParams {
+        rays: rays.len() as u32,
+        anchors: m.slots,
+        classes: CLASSES,
+        spawns: m.spawns,
+        spawn_distance: m.spawn_distance,
+        merge_distance: 0.25,
+        stable: 0.1,
+        min_importance: 1.0,
+        min_age: 40.0,
+        ..MaintainAnchorsParams::default()
+    };
+    let state = matched(&rays, &features, &anchors);
+    Case {
+        name: m.name,
+        kernel: &MAINTAIN_ANCHORS,
+        params: words(&p),
+        buffers: vec![ray_words(&rays), state, anchors, votes(m.slots), vec![0; 4]],
+        workgroups: [1, 1, 1],
+        tolerance: anchor_tolerance(&MAINTAIN_ANCHORS),
+        overwritten: Vec::new(),
+    }
+}
+
+/// All cases of a kernel; empty for a name that is not known.
+pub(crate) fn cases(kernel: &str) -> Vec<Case> {
+    match kernel {
+        "attend_keys" => attend_keys(),
+        "attend_queries" => attend_queries(),
+        "attend_tokens" => attend_tokens(),
+        "extract_tokens" => extract_tokens(),
+        "gate_backward" => gate_backward(),
+        "gate_tokens" => vec![gate(&usual()), gate(&grid(5, 2))],
+        "maintain_anchors" => maintenance().into_iter().map(|(case, _)| case).collect(),
+        "token_layer" => token_layer(),
+        "token_layer_backward" => token_layer_backward(),
+        "token_loss" => token_loss(),
+        "token_weights" => token_weights(),
+        "update_anchors" => update_anchors(),
+        _ => Vec::new(),
+    }
+}
