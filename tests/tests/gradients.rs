@@ -17,7 +17,7 @@ use mte_slam_core::{
         sample_rays::SAMPLE_RAYS,
         shared::{FLAG_GUIDED, FLAG_MAP, FLAG_POSE},
     },
-    layout::{GEOMETRY_FLOATS, HEAD_FLOATS, RAY_OUT_FLOATS},
+    layout::{GEOMETRY_FLOATS, HEAD_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS},
     pose::Pose,
     recording::Recording,
 };
@@ -390,7 +390,7 @@ fn rays_without_depth_teach_colour() {
     // The pose of slot 0, which is the second frame of the window.
     let rays = options.rays_per_frame as usize;
     let mut pose_gradient = [0.0; 6];
-    for ray in state.floats("ray_state").chunks_exact(304).skip(rays).take(rays) {
+    for ray in state.floats("ray_state").chunks_exact(RAY_STATE_FLOATS).skip(rays).take(rays) {
         for k in 0..3 {
             pose_gradient[k] += f64::from(ray[296 + k]);
             pose_gradient[3 + k] += f64::from(ray[300 + k]);

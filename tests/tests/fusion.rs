@@ -1,0 +1,414 @@
+//! Feature fusion and redundancy suppressor through the recordings of `Device`: analytic gradients
+//! against central differences, where a patch of the image shows up, what the losses move, and
+//! settings that are refused.
+use mte_slam_core::{
+    config::{Config, FusionConfig, LossConfig},
+    device::{Batch, Device, Rates},
+    engine::Engine,
+    frame::Frame,
+    kernels::{
+        shared::{FLAG_GUIDED, FLAG_MAP},
+        tokens::{APPEARANCE_AT, COLOR_AT, NO_BIAS},
+    },
+    layout::{ANCHOR_FLOATS, GEOMETRY_FLOATS, HEAD_FLOATS, RAY_STATE_FLOATS, STATE_ANCHOR},
+    recording::{BufferId, Recording},
+};
+use mte_slam_tests::{
+    TestRandom, f32_words,
+    fixture::{self, CLASSES, DEPTH_UNIT_M, FRAMES, Options, State},
+    gpu_engine,
+};
+use pollster::block_on;
+use std::ops::Range;
+
+const RAYS_PER_FRAME: u32 = 60;
+const SLOT: u32 = 1;
+
+fn config(fusion: FusionConfig) -> Config {
+    let mut c = Config { field: fixture::field_config(), fusion, ..Config::default() };
+    c.field.sharpness = 4.0;
+    (c.sampling.stratified, c.sampling.surface) = (12, 4);
+    c.sampling.min_weight = 0.0;
+    (c.mapping.rays, c.tracking.render_rays) = (FRAMES * RAYS_PER_FRAME, 1);
+    c.keyframes.budget_mib = 1;
+    c.suppressor.anchors = 16;
+    c
+}
+
+/// A device with frames, random planes and decoders, and parameters of the fusion none of which is
+/// 0: biases start there, and attention starts close to a mean.
+fn device(engine: Engine, fusion: FusionConfig) -> Device {
+    let camera = fixture::wide_camera();
+    let mut d =
+        Device::new(engine, &config(fusion), camera, DEPTH_UNIT_M, CLASSES, fixture::shape())
+            .unwrap();
+    let mut r = Recording::new();
+    let state = State::new(&Options::default());
+    for (tensor, name) in [
+        (d.geometry, "planes_geometry"),
+        (d.appearance, "planes_appearance"),
+        (d.semantic, "planes_semantic"),
+        (d.decoders, "decoders"),
+    ] {
+        r.upload(tensor.values, 0, &state.buffers[name]);
+    }
+    for slot in 0..FRAMES {
+        d.upload_frame(&mut r, slot, &fixture::frame_of(&camera, slot));
+        d.upload_pose(&mut r, slot, &fixture::pose(slot));
+    }
+    d.upload_window(&mut r, &[(2, true), (0, true), (1, true)]);
+    d.upload_class_weights(&mut r, &[1.0, 0.5, 2.0, 1.5, 0.75]);
+    d.engine.submit(&r).unwrap();
+    let f = d.fusion.as_ref().unwrap();
+    let (tensor, layers) = (f.parameters, f.layers.clone());
+    let mut values = read(&mut d, tensor.values, tensor.floats);
+    let mut random = TestRandom(401);
+    for layer in &layers {
+        if layer.bias != NO_BIAS {
+            let biases = layer.bias as usize..(layer.bias + layer.bias_count()) as usize;
+            values[biases].fill_with(|| random.uniform(-0.2, 0.2));
+        }
+        if layer.name.starts_with(['Q', 'K']) {
+            let weights = layer.weights as usize..(layer.weights + layer.weight_count()) as usize;
+            values[weights].iter_mut().for_each(|w| *w *= 2.0);
+        }
+    }
+    set(&mut d, tensor.values, &values);
+    d
+}
+
+fn read(d: &mut Device, buffer: BufferId, floats: usize) -> Vec<f32> {
+    block_on(d.engine.read_as(buffer, 0, floats)).unwrap()
+}
+
+fn set(d: &mut Device, buffer: BufferId, values: &[f32]) {
+    let mut r = Recording::new();
+    r.upload(buffer, 0, values);
+    d.engine.submit(&r).unwrap();
+}
+
+/// Mean over the tokens of the loss at F.
+fn fusion_loss(d: &mut Device) -> f64 {
+    let mut r = Recording::new();
+    d.record_fusion_backward(&mut r, SLOT);
+    d.engine.submit(&r).unwrap();
+    let f = d.fusion.as_ref().unwrap();
+    let (tokens, stride, count) = (f.tokens, f.stride as usize, f.count());
+    let tokens = read(d, tokens, count * stride);
+    let column = tokens.iter().skip(COLOR_AT as usize + 3).step_by(stride);
+    column.map(|x| f64::from(*x)).sum::<f64>() / count as f64
+}
+
+/// Compares a part of a tensor's gradient with differences of a loss: along the gradient, along
+/// random signs of it, and at single parameters.
+fn check(
+    d: &mut Device,
+    buffer: BufferId,
+    gradient: &[f32],
+    part: Range<usize>,
+    name: &str,
+    loss: &mut dyn FnMut(&mut Device) -> f64,
+) {
+    let values = read(d, buffer, gradient.len());
+    let norm = part.clone().map(|i| gradient[i] * gradient[i]).sum::<f32>().sqrt();
+    let largest = part.clone().map(|i| gradient[i].abs()).fold(0.0, f32::max);
+    assert!(norm > 1e-4, "{name}: no gradient ({norm})");
+    let nonzero = part.clone().filter(|i| gradient[*i] != 0.0).count();
+    assert!(nonzero * 8 > part.len(), "{name}: {nonzero} of {} have one", part.len());
+
+    // Small, for rectifiers of few tokens have their kinks: errors shrink with the step. Rounding
+    // is still below some thousandths of what the loss changes by.
+    let h = (2e-4 / norm).clamp(2e-4, 2e-3);
+    let mut slope = |direction: &dyn Fn(usize) -> f32, h: f32| {
+        let mut at = |h: f32| {
+            let mut moved = values.clone();
+            part.clone().for_each(|i| moved[i] += h * direction(i));
+            set(d, buffer, &moved);
+            loss(d)
+        };
+        (at(h) - at(-h)) / (2.0 * f64::from(h))
+    };
+    let mut random = TestRandom(9);
+    let signs: Vec<f32> =
+        gradient.iter().map(|_| if random.bits().is_multiple_of(2) { -1.0 } else { 1.0 }).collect();
+    for (which, mixed) in [("gradient", false), ("mixed", true)] {
+        let direction = |i: usize| if mixed { signs[i] } else { 1.0 } * gradient[i] / norm;
+        let expected: f64 =
+            part.clone().map(|i| f64::from(direction(i)) * f64::from(gradient[i])).sum();
+        let found = slope(&direction, h);
+        let error = (found - expected).abs() / f64::from(norm);
+        println!("{name} along {which}: {expected:.6} {found:.6}, off by {error:.1e} of the norm");
+        assert!(error < 0.01, "{name} along {which}: {expected} analytic, {found} measured");
+    }
+    let mut order: Vec<usize> = part.clone().collect();
+    order.sort_by(|a, b| gradient[*b].abs().total_cmp(&gradient[*a].abs()));
+    let mut outliers = Vec::new();
+    for i in order.iter().step_by((order.len() / 24).max(1)).take(8) {
+        let found = slope(&|k| if k == *i { 1.0 } else { 0.0 }, 4.0 * h);
+        let expected = f64::from(gradient[*i]);
+        if (found - expected).abs() > 0.03 * expected.abs() + 0.005 * f64::from(largest) + 1e-5 {
+            outliers.push((*i, expected, found));
+        }
+    }
+    set(d, buffer, &values);
+    assert!(outliers.len() <= 1, "{name}: {outliers:?}");
+}
+
+/// Every layer of the fusion and the class head it shares with the field.
+fn fusion_gradients(fusion: FusionConfig) {
+    let local = fusion.local;
+    let mut d = device(Engine::cpu(), fusion);
+    fusion_loss(&mut d);
+    let f = d.fusion.as_ref().unwrap();
+    let (tensor, layers) = (f.parameters, f.layers.clone());
+    assert_eq!((f.columns, f.rows), (13, 7));
+    let gradient = read(&mut d, tensor.gradient, tensor.floats);
+    for layer in layers {
+        let weights = layer.weights as usize..(layer.weights + layer.weight_count()) as usize;
+        if layer.name == "depthwise" && !local {
+            assert!(gradient[weights].iter().all(|g| *g == 0.0), "nothing reads it");
+            continue;
+        }
+        check(&mut d, tensor.values, &gradient, weights, layer.name, &mut fusion_loss);
+        if layer.bias != NO_BIAS {
+            let biases = layer.bias as usize..(layer.bias + layer.bias_count()) as usize;
+            let name = format!("{}, biases", layer.name);
+            check(&mut d, tensor.values, &gradient, biases, &name, &mut fusion_loss);
+        }
+    }
+    let decoders = d.decoders;
+    let gradient = read(&mut d, decoders.gradient, decoders.floats);
+    let bias = HEAD_FLOATS + CLASSES as usize * 16;
+    for (name, part) in
+        [("class head", HEAD_FLOATS..bias), ("class head, biases", bias..bias + CLASSES as usize)]
+    {
+        check(&mut d, decoders.values, &gradient, part, name, &mut fusion_loss);
+    }
+}
+
+#[test]
+fn gradients_of_the_fusion() {
+    fusion_gradients(FusionConfig::default());
+}
+
+#[test]
+fn gradients_of_the_widest_fusion() {
+    fusion_gradients(FusionConfig {
+        key_stride: 1,
+        local_kernel: 3,
+        gate_kernel: 3,
+        ..FusionConfig::default()
+    });
+}
+
+#[test]
+fn gradients_of_the_plainest_fusion() {
+    fusion_gradients(FusionConfig {
+        key_stride: 3,
+        residual: false,
+        local: false,
+        ..FusionConfig::default()
+    });
+}
+
+const NO_LOSS: LossConfig =
+    LossConfig { free_space: 0.0, centre: 0.0, tail: 0.0, depth: 0.0, color: 0.0, semantic: 0.0 };
+
+fn batch(compression: f64, feature: f64) -> Batch<'static> {
+    Batch {
+        frames: FRAMES,
+        rays_per_frame: RAYS_PER_FRAME,
+        stratified: 12,
+        surface: 4,
+        flags: FLAG_GUIDED | FLAG_MAP,
+        loss: &NO_LOSS,
+        iteration: 5,
+        first: 0,
+        compression,
+        feature,
+    }
+}
+
+/// A device with anchors (every fourth slot is free) and the fused features of all frames.
+fn supervised() -> Device {
+    let mut d = device(Engine::cpu(), FusionConfig::default());
+    let mut r = Recording::new();
+    (0..FRAMES).for_each(|slot| d.record_fusion_forward(&mut r, slot));
+    let mut random = TestRandom(411);
+    let mut anchors = Vec::new();
+    for i in 0..16 {
+        anchors.extend(f32_words((0..16).map(|_| random.uniform(-0.5, 0.5))));
+        anchors.push(if i % 4 == 3 { 255 } else { i % CLASSES });
+        anchors.resize(anchors.len() + ANCHOR_FLOATS - 17, 0);
+    }
+    r.upload(d.suppressor.as_ref().unwrap().anchors, 0, &anchors);
+    d.engine.submit(&r).unwrap();
+    d
+}
+
+/// The weighted loss against anchors and fused features, mean over the rays.
+fn ray_loss(d: &mut Device, b: &Batch<'_>) -> f64 {
+    let mut r = Recording::new();
+    d.record_forward(&mut r, b);
+    d.engine.submit(&r).unwrap();
+    let rays = FRAMES * RAYS_PER_FRAME;
+    let state = block_on(d.read_ray_state(rays)).unwrap();
+    let column = state.iter().skip(STATE_ANCHOR as usize * 4 + 3).step_by(RAY_STATE_FLOATS);
+    column.map(|x| f64::from(*x)).sum::<f64>() / f64::from(rays)
+}
+
+/// Compression loss, feature loss and both: semantic planes and decoder follow their gradients,
+/// and nothing else has one.
+#[test]
+fn gradients_of_anchors_and_fused_features() {
+    for (name, b) in
+        [("anchors", batch(0.8, 0.0)), ("features", batch(0.0, 0.6)), ("both", batch(0.8, 0.6))]
+    {
+        let mut d = supervised();
+        assert!(ray_loss(&mut d, &b) > 0.01, "{name}: no loss");
+        // One step with rate 0: Adam's first moments are a tenth of the gradients afterwards.
+        let mut r = Recording::new();
+        d.record_forward(&mut r, &b);
+        d.record_backward(&mut r, &b);
+        d.record_step(&mut r, &b, Rates { planes: 0.0, decoders: 0.0 });
+        d.engine.submit(&r).unwrap();
+        assert_eq!(block_on(d.read_status()).unwrap(), 0, "saturated or not finite");
+        let tensors = [d.geometry, d.appearance, d.semantic, d.decoders];
+        let [geometry, appearance, semantic, decoders] = tensors.map(|t| -> Vec<f32> {
+            read(&mut d, t.moment1, t.floats).iter().map(|m| m * 10.0).collect()
+        });
+        assert!(geometry.iter().chain(&appearance).all(|g| *g == 0.0), "{name}");
+        let s = GEOMETRY_FLOATS;
+        assert!(decoders[..s + 1188].iter().chain(&decoders[HEAD_FLOATS..]).all(|g| *g == 0.0));
+        let fine = d.shape.surface[1][3] as usize * 16;
+        let mut loss = |d: &mut Device| ray_loss(d, &b);
+        for (part, range) in [("coarse planes", 0..fine), ("fine planes", fine..semantic.len())] {
+            let name = format!("{name}: {part}");
+            check(&mut d, tensors[2].values, &semantic, range, &name, &mut loss);
+        }
+        for (part, range) in [
+            ("layer 1", s + 1188..s + 2212),
+            ("bias 1", s + 2212..s + 2244),
+            ("layer 2", s + 2244..s + 2756),
+            ("bias 2", s + 2756..s + 2772),
+        ] {
+            let name = format!("{name}: {part}");
+            check(&mut d, tensors[3].values, &decoders, range, &name, &mut loss);
+        }
+    }
+}
+
+/// Without any cross-entropy at the rays the feature loss alone pulls the semantic planes to the
+/// fused features; without its weight nothing moves, nor do other planes.
+#[test]
+fn the_feature_loss_moves_the_planes() {
+    let train = |b: &Batch<'_>| {
+        let mut d = supervised();
+        let before =
+            [d.geometry, d.appearance, d.semantic].map(|t| read(&mut d, t.values, t.floats));
+        let start = ray_loss(&mut d, &batch(0.0, 1.0));
+        for _ in 0..30 {
+            let mut r = Recording::new();
+            d.record_forward(&mut r, b);
+            d.record_backward(&mut r, b);
+            d.record_step(&mut r, b, Rates { planes: 5e-3, decoders: 0.0 });
+            d.engine.submit(&r).unwrap();
+        }
+        let after =
+            [d.geometry, d.appearance, d.semantic].map(|t| read(&mut d, t.values, t.floats));
+        let moved =
+            [0, 1, 2].map(|k| before[k].iter().zip(&after[k]).filter(|(a, b)| a != b).count());
+        (start, ray_loss(&mut d, &batch(0.0, 1.0)), moved, after[2].len())
+    };
+    let (start, end, moved, all) = train(&batch(0.0, 0.6));
+    println!("{start} {end} {moved:?} of {all}");
+    assert!(end < 0.7 * start, "{start} {end}");
+    assert_eq!(moved[..2], [0, 0]);
+    assert!(moved[2] * 20 > all, "{moved:?} of {all}");
+    let (start, end, moved, _) = train(&batch(0.0, 0.0));
+    assert_eq!((start, moved), (end, [0, 0, 0]));
+}
+
+/// The response of the appearance embedding at every token, in raster order.
+fn appearance(d: &mut Device, frame: &Frame) -> Vec<Vec<u32>> {
+    let mut r = Recording::new();
+    d.upload_frame(&mut r, SLOT, frame);
+    d.record_fusion_forward(&mut r, SLOT);
+    d.engine.submit(&r).unwrap();
+    let f = d.fusion.as_ref().unwrap();
+    let (tokens, stride, count) = (f.tokens, f.stride as usize, f.count());
+    let rows = block_on(d.engine.read(tokens, 0, count * stride)).unwrap();
+    let at = APPEARANCE_AT as usize;
+    rows.chunks_exact(stride).map(|row| row[at..at + 16].to_vec()).collect()
+}
+
+/// A bright square (left, top, edge) on a dark image.
+fn bright(left: u32, top: u32, edge: u32) -> Frame {
+    let camera = fixture::wide_camera();
+    let mut frame = fixture::frame_of(&camera, 0);
+    for (i, c) in frame.color.iter_mut().enumerate() {
+        let (u, v) = (i as u32 % camera.width, i as u32 / camera.width);
+        let inside = (left..left + edge).contains(&u) && (top..top + edge).contains(&v);
+        *c = if inside { [250, 180, 90] } else { [0, 0, 0] };
+    }
+    frame
+}
+
+/// A patch, and a single pixel, moved by a token move the response by exactly one token: tokens
+/// lie in raster order, on a grid of more columns than rows.
+fn deltas(engine: Engine) {
+    let mut d = device(engine, FusionConfig::default());
+    let dark = appearance(&mut d, &bright(0, 0, 0));
+    assert!(dark.iter().all(|token| *token == dark[0]));
+    let (columns, rows) = (13, 7);
+    for (left, top, edge) in [(0, 0, 8), (3, 5, 1)] {
+        let mut first = Vec::new();
+        for (column, row) in
+            (0..columns).map(|c| (c, 2)).chain((0..rows).map(|r| (4, r))).chain([(12, 6)])
+        {
+            let frame = bright(8 * column + left, 8 * row + top, edge);
+            let response = appearance(&mut d, &frame);
+            let lit: Vec<usize> = (0..response.len()).filter(|i| response[*i] != dark[0]).collect();
+            let token = (row * columns + column) as usize;
+            assert_eq!(lit, [token], "column {column}, row {row}");
+            if first.is_empty() {
+                first = response[token].clone();
+            }
+            assert_eq!(response[token], first, "column {column}, row {row}");
+        }
+        // Within a token the place of the pixel matters.
+        if edge == 1 {
+            let transposed = appearance(&mut d, &bright(8 * 4 + top, 8 * 2 + left, edge));
+            assert_ne!(transposed[2 * 13 + 4], first);
+        }
+    }
+    // Beyond the last whole token nothing is seen.
+    assert_eq!(appearance(&mut d, &bright(105, 57, 2)), dark);
+}
+
+#[test]
+fn a_patch_moves_its_own_token() {
+    deltas(Engine::cpu());
+    gpu_engine().into_iter().for_each(deltas);
+}
+
+/// An image smaller than a token fuses nothing, and nothing fails.
+#[test]
+fn an_image_smaller_than_a_token() {
+    let camera = mte_slam_core::camera::Camera { width: 30, height: 7, ..fixture::camera() };
+    let c = config(FusionConfig::default());
+    let mut d =
+        Device::new(Engine::cpu(), &c, camera, DEPTH_UNIT_M, CLASSES, fixture::shape()).unwrap();
+    assert!(d.fusion.is_none() && d.suppressor.is_some());
+    let mut r = Recording::new();
+    d.upload_frame(&mut r, 0, &fixture::frame_of(&camera, 0));
+    d.upload_pose(&mut r, 0, &fixture::pose(0));
+    d.upload_window(&mut r, &[(0, true), (0, true), (0, true)]);
+    d.record_fusion_step(&mut r, 0, 1e-3);
+    let b = batch(0.1, 0.5);
+    d.record_forward(&mut r, &b);
+    d.record_backward(&mut r, &b);
+    d.record_step(&mut r, &b, Rates { planes: 5e-3, decoders: 1e-3 });
+    d.engine.submit(&r).unwrap();
+    assert_eq!(block_on(d.read_status()).unwrap(), 0);
+}
