@@ -412,3 +412,58 @@ fn an_image_smaller_than_a_token() {
     d.engine.submit(&r).unwrap();
     assert_eq!(block_on(d.read_status()).unwrap(), 0);
 }
+
+/// Each setting out of range is refused by name, with what was found and what is expected.
+#[test]
+fn bad_settings_are_refused_by_name() {
+    type Change = fn(&mut Config);
+    let bad: &[(&str, &str, Change)] = &[
+        ("fusion.token_pixels", "7", |c| c.fusion.token_pixels = 7),
+        ("fusion.token_pixels", "0", |c| c.fusion.token_pixels = 0),
+        ("fusion.token_pixels", "40", |c| c.fusion.token_pixels = 40),
+        ("fusion.key_stride", "0", |c| c.fusion.key_stride = 0),
+        ("fusion.key_stride", "17", |c| c.fusion.key_stride = 17),
+        ("fusion.local_kernel", "2", |c| c.fusion.local_kernel = 2),
+        ("fusion.gate_kernel", "5", |c| c.fusion.gate_kernel = 5),
+        ("fusion.steps", "1001", |c| c.fusion.steps = 1001),
+        ("fusion.first_steps", "10001", |c| c.fusion.first_steps = 10_001),
+        ("fusion.rate", "0", |c| c.fusion.rate = 0.0),
+        ("fusion.rate", "NaN", |c| c.fusion.rate = f64::NAN),
+        ("fusion.weight_class", "-1", |c| c.fusion.weight_class = -1.0),
+        ("fusion.weight_color", "inf", |c| c.fusion.weight_color = f64::INFINITY),
+        ("fusion.balance", "NaN", |c| c.fusion.balance = f64::NAN),
+        ("fusion.weight", "-0.5", |c| c.fusion.weight = -0.5),
+        ("suppressor.anchors", "0", |c| c.suppressor.anchors = 0),
+        ("suppressor.anchors", "300", |c| c.suppressor.anchors = 300),
+        ("suppressor.weight", "-1", |c| c.suppressor.weight = -1.0),
+        ("suppressor.beta", "1.5", |c| c.suppressor.beta = 1.5),
+        ("suppressor.beta", "NaN", |c| c.suppressor.beta = f64::NAN),
+        ("suppressor.decay", "-0.1", |c| c.suppressor.decay = -0.1),
+        ("suppressor.memory", "0", |c| c.suppressor.memory = 0.0),
+        ("suppressor.spawn_distance", "0", |c| c.suppressor.spawn_distance = 0.0),
+        ("suppressor.merge_distance", "NaN", |c| c.suppressor.merge_distance = f64::NAN),
+        ("suppressor.stable", "-1", |c| c.suppressor.stable = -1.0),
+        ("suppressor.min_importance", "-2", |c| c.suppressor.min_importance = -2.0),
+    ];
+    for (field, found, change) in bad {
+        let mut c = Config::default();
+        change(&mut c);
+        let error = c.validate().expect_err(field);
+        assert_eq!((error.field, error.found.as_str()), (*field, *found));
+        assert!(error.to_string().contains(field), "{error}");
+    }
+    // The edges of the ranges are good.
+    let good: &[Change] = &[
+        |c| c.suppressor.anchors = 1,
+        |c| c.suppressor.anchors = 256,
+        |c| c.fusion.token_pixels = 32,
+        |c| c.fusion.key_stride = 16,
+        |c| (c.fusion.steps, c.fusion.first_steps) = (0, 0),
+        |c| (c.suppressor.beta, c.suppressor.decay) = (1.0, 1.0),
+    ];
+    for change in good {
+        let mut c = Config::default();
+        change(&mut c);
+        c.validate().unwrap();
+    }
+}
