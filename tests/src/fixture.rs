@@ -267,6 +267,8 @@ impl State {
         zero("gradient_appearance", shape.surface_floats());
         zero("gradient_semantic", shape.surface_floats());
         zero("status", 4);
+        b.insert("class_weights", f32_words([1.0, 0.5, 2.0, 1.5, 0.75]));
+        let mut zero = |name, words| b.insert(name, vec![0; words]);
         // Neither anchors nor fused features.
         zero("anchors", 4);
         zero("targets", 4);

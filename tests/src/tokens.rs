@@ -5,7 +5,7 @@ use crate::{
     Compare, TestRandom,
     cases::{Case, SUMS},
     f32_words, fixture,
-    fixture::{CLASSES, POISON, words},
+    fixture::{CLASSES, Options, POISON, State, words},
 };
 use mte_slam_core::{
     engine::Engine,
@@ -18,6 +18,7 @@ use mte_slam_core::{
         gate_backward::GATE_BACKWARD,
         gate_tokens::GATE_TOKENS,
         maintain_anchors::{MAINTAIN_ANCHORS, MaintainAnchorsParams},
+        recall_tokens::RECALL_TOKENS,
         shared::{RAY_MASKED, Ray},
         token_layer::TOKEN_LAYER,
         token_layer_backward::TOKEN_LAYER_BACKWARD,
@@ -26,7 +27,7 @@ use mte_slam_core::{
         tokens::{
             APPEARANCE_AT, COLOR_AT, DEPTHWISE_AT, FIRST_AT, FUSED_AT, GATE_AT, GEOMETRY_AT,
             GEOMETRY_INPUTS, GUIDED_AT, HIDDEN, HIDDEN_AT, LOCAL_AT, LOGITS_AT, NO_BIAS,
-            NO_RESIDUAL, PATCH_INPUTS, RAW_GEOMETRY, RAW_HISTOGRAM, RAW_MEAN, RAW_PATCH,
+            NO_RESIDUAL, PATCH_INPUTS, RAW_GEOMETRY, RAW_HISTOGRAM, RAW_MEAN, RAW_PATCH, RAW_POINT,
             REFINED_AT, SECOND_AT, SEMANTIC_AT, STATISTICS_AT, TILE, TokenParams,
         },
         update_anchors::{UPDATE_ANCHORS, UpdateAnchorsParams},
@@ -431,6 +432,24 @@ fn extract_tokens() -> Vec<Case> {
     ]
 }
 
+/// Points in, at and beyond the map's box; every fourth token has none.
+fn recall_tokens() -> Vec<Case> {
+    let mut state = State::new(&Options::default());
+    let grid = usual();
+    let p = &mut state.params;
+    (p.token_columns, p.token_rows, p.raw_stride) = (grid.columns, grid.rows, grid.raw_stride);
+    let (mut random, mut raw) = (TestRandom(395), raw(&grid, 396));
+    for row in raw.chunks_exact_mut(grid.raw_stride as usize) {
+        let at = RAW_POINT as usize;
+        row[at..at + 3].fill_with(|| random.uniform(-1.0, 1.0).to_bits());
+    }
+    let buffers =
+        vec![state.buffers["planes_semantic"].clone(), state.buffers["decoders"].clone(), raw];
+    let mut case = token_case("points", &RECALL_TOKENS, &grid, buffers, grid.tokens());
+    case.params = words(&state.params);
+    vec![case]
+}
+
 /// Slots of anchors.
 const ANCHORS: u32 = 21;
 
@@ -732,6 +751,7 @@ pub(crate) fn cases(kernel: &str) -> Vec<Case> {
         "gate_backward" => gate_backward(),
         "gate_tokens" => vec![gate(&usual()), gate(&grid(5, 2))],
         "maintain_anchors" => maintenance().into_iter().map(|(case, _)| case).collect(),
+        "recall_tokens" => recall_tokens(),
         "token_layer" => token_layer(),
         "token_layer_backward" => token_layer_backward(),
         "token_loss" => token_loss(),

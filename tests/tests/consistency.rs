@@ -84,7 +84,7 @@ consistency! {
     adam align_points attend_keys attend_queries attend_tokens composite composite_backward
     decode_rays extract_tokens gate_backward gate_tokens geometry_backward geometry_forward
     geometry_weights maintain_anchors mask_rays pose_gradient pose_step query_points
-    reduce_partials sample_depths sample_rays scatter_geometry scatter_surface token_layer
+    recall_tokens reduce_partials sample_depths sample_rays scatter_geometry scatter_surface token_layer
     token_layer_backward token_loss token_weights update_anchors weight_gradient
 }
 

@@ -57,7 +57,7 @@ fn device(engine: Engine, fusion: FusionConfig) -> Device {
         d.upload_pose(&mut r, slot, &fixture::pose(slot));
     }
     d.upload_window(&mut r, &[(2, true), (0, true), (1, true)]);
-    d.upload_class_weights(&mut r, &[1.0, 0.5, 2.0, 1.5, 0.75]);
+    d.upload_class_weights(&mut r, &[1.0; 5], &[1.0, 0.5, 2.0, 1.5, 0.75]);
     d.engine.submit(&r).unwrap();
     let f = d.fusion.as_ref().unwrap();
     let (tensor, layers) = (f.parameters, f.layers.clone());
@@ -135,10 +135,14 @@ fn check(
         let direction = |i: usize| if mixed { signs[i] } else { 1.0 } * gradient[i] / norm;
         let expected: f64 =
             part.clone().map(|i| f64::from(direction(i)) * f64::from(gradient[i])).sum();
-        let found = slope(&direction, h);
-        let error = (found - expected).abs() / f64::from(norm);
-        println!("{name} along {which}: {expected:.6} {found:.6}, off by {error:.1e} of the norm");
-        assert!(error < 0.01, "{name} along {which}: {expected} analytic, {found} measured");
+        // Where a step crosses a kink, smaller ones come closer; a wrong gradient stays wrong.
+        let mut found = Vec::new();
+        let close = [1.0, 0.25, 0.0625].into_iter().any(|part| {
+            found.push(slope(&direction, part * h));
+            (found[found.len() - 1] - expected).abs() < 0.01 * f64::from(norm)
+        });
+        println!("{name} along {which}: {expected:.6} {found:.6?}, norm {norm:.6}");
+        assert!(close, "{name} along {which}: {expected} analytic, {found:?} measured");
     }
     let mut order: Vec<usize> = part.clone().collect();
     order.sort_by(|a, b| gradient[*b].abs().total_cmp(&gradient[*a].abs()));
@@ -211,8 +215,15 @@ fn gradients_of_the_plainest_fusion() {
     });
 }
 
-const NO_LOSS: LossConfig =
-    LossConfig { free_space: 0.0, centre: 0.0, tail: 0.0, depth: 0.0, color: 0.0, semantic: 0.0 };
+const NO_LOSS: LossConfig = LossConfig {
+    free_space: 0.0,
+    centre: 0.0,
+    tail: 0.0,
+    depth: 0.0,
+    color: 0.0,
+    semantic: 0.0,
+    balance: 0.0,
+};
 
 fn batch(compression: f64, feature: f64) -> Batch<'static> {
     Batch {

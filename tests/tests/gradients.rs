@@ -165,7 +165,15 @@ fn total_loss(out: &[f32], loss: &LossConfig) -> f64 {
 }
 
 fn losses() -> LossConfig {
-    LossConfig { free_space: 1.0, centre: 60.0, tail: 10.0, depth: 2.0, color: 5.0, semantic: 1.0 }
+    LossConfig {
+        free_space: 1.0,
+        centre: 60.0,
+        tail: 10.0,
+        depth: 2.0,
+        color: 5.0,
+        semantic: 1.0,
+        balance: 0.0,
+    }
 }
 
 /// Compares a part of a tensor's gradient with differences of the loss: single parameters with
@@ -291,6 +299,7 @@ fn semantic_gradients_stop_at_the_weights() {
         depth: 0.0,
         color: 0.0,
         semantic: 1.0,
+        balance: 0.0,
     };
     let mut problem = Problem::new(Engine::cpu(), only);
     let [geometry, appearance, semantic, decoders] = problem.gradients();

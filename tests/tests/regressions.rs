@@ -229,6 +229,8 @@ fn a_reused_slot_forgets_the_pose_steps_of_its_former_frame() {
                 loss: &loss,
                 iteration,
                 first: 0,
+                compression: 0.0,
+                feature: 0.0,
             };
             d.record_forward(r, &batch);
             d.record_backward(r, &batch);
