@@ -4,6 +4,7 @@ use crate::{
     cases::Case,
     compare_outputs,
     fixture::{POISON, run_words_async},
+    recorded::Outcome,
 };
 use mte_slam_core::{
     config::Config,
@@ -30,7 +31,7 @@ pub async fn run_case(engine: &mut Engine, case: &Case) -> Result<Vec<Vec<u32>>,
 pub async fn check_cases(
     engine: &mut Engine,
     cases: &[Case],
-    expected: &[Vec<Vec<u32>>],
+    expected: &[Outcome],
 ) -> Result<(), String> {
     if cases.is_empty() || cases.len() != expected.len() {
         return Err(format!("{} cases, {} expected results", cases.len(), expected.len()));

@@ -12,10 +12,13 @@ use mte_slam_core::{
 };
 use pollster::block_on;
 
+/// All buffers after a case.
+pub type Outcome = Vec<Vec<u32>>;
+
 /// See the module.
 pub struct Recorded {
     /// For each kernel, in the order of [`kernels::all`]: its cases and their results.
-    pub kernels: Vec<(Vec<Case>, Vec<Vec<Vec<u32>>>)>,
+    pub kernels: Vec<(Vec<Case>, Vec<Outcome>)>,
     /// Poses of [`body::short_run`].
     pub poses: Vec<Pose>,
 }

@@ -180,6 +180,7 @@ impl Session {
             Some("open") => {
                 // Two maps at once could pass the device's memory.
                 self.run = None;
+                check_settings(command)?;
                 let OpenCommand { source, settings } = parse(command, "open")?;
                 self.run = Some(Run::open(&source, settings).await?);
                 Ok(())
@@ -223,6 +224,26 @@ fn text(object: &JsValue, key: &str) -> Option<String> {
 fn parse<T: DeserializeOwned>(value: &JsValue, what: &str) -> Result<T, Failure> {
     serde_wasm_bindgen::from_value(value.clone())
         .map_err(|e| Failure::new(ErrorKind::BadSettings, format!("{what}: {e}")))
+}
+
+/// Refuses settings that do not exist: serde does not see the surplus keys of a JavaScript object.
+fn check_settings(command: &JsValue) -> Result<(), Failure> {
+    let settings = Reflect::get(command, &"settings".into()).unwrap_or(JsValue::UNDEFINED);
+    let Some(object) = settings.dyn_ref::<js_sys::Object>() else { return Ok(()) };
+    let known = serde_json::to_value(Settings::default()).unwrap_or_default();
+    let surplus = js_sys::Object::keys(object)
+        .iter()
+        .filter_map(|key| key.as_string())
+        .find(|key| known.get(key).is_none());
+    match surplus {
+        Some(key) => {
+            let names: Vec<&String> =
+                known.as_object().into_iter().flat_map(|m| m.keys()).collect();
+            let message = format!("settings: {key}: no such setting, expected one of {names:?}");
+            Err(Failure::new(ErrorKind::BadSettings, message))
+        }
+        None => Ok(()),
+    }
 }
 
 /// An engine, and why it is not the one that was preferred.

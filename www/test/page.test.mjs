@@ -75,6 +75,8 @@ const failure = async (page, kind, timeout = 60_000) => {
   assert.equal(await page.locator("#failure").getAttribute("data-kind"), kind, await page.locator("#failure-text").textContent());
   return page.locator("#failure-text").textContent();
 };
+/** Puts the pane away, so that the next one is seen to come. */
+const dismiss = (page) => page.evaluate(() => (document.getElementById("failure").hidden = true));
 async function download(page, kind) {
   const [file] = await Promise.all([page.waitForEvent("download", { timeout: 90_000 }), page.locator(`[data-kind="${kind}"]`).click()]);
   return readFileSync(await file.path());
@@ -189,7 +191,8 @@ test("a first visit: start the built-in room, watch it grow, use everything", { 
   assert.equal(metrics.frames_processed, processed);
   assert.ok(metrics.trajectory.aligned_cm.rmse < 20);
   const checkpoint = await download(page, "checkpoint");
-  assert.ok(JSON.parse(checkpoint.toString("utf8", 8, 8 + Number(checkpoint.readBigUInt64LE(0)))).decoders === undefined);
+  const header = JSON.parse(checkpoint.toString("utf8", 8, 8 + Number(checkpoint.readBigUInt64LE(0))));
+  assert.equal(header["decoders.values"].dtype, "F32");
 
   // The address holds the run: a reload in the middle goes on with the same settings.
   assert.match(page.url(), /source=room.*preset=tiny.*engine=cpu/);
@@ -319,11 +322,14 @@ test("what is wrong with a recording is said", { timeout: 120_000 }, async () =>
   await page.locator("#begin").click();
   assert.match(await failure(page, "bad-file"), /replica needs results\/frame/);
 
+  await dismiss(page);
   await page.evaluate(() => window.mteSlam.slam.open({ kind: "zip", name: "x.zip", file: new Blob(["not a zip"]) }, { engine: "cpu" }));
   assert.match(await failure(page, "bad-file"), /expected a zip archive/);
+  await dismiss(page);
   for (const [settings, part] of [[{ preset: "nonsense" }, /nonsense/], [{ overrides: { "mapping.rayz": 3 } }, /rayz/], [{ colour: 1 }, /colour/]]) {
     await page.evaluate((s) => window.mteSlam.slam.open({ kind: "built-in", scene: "room", frames: 3, width: 64, noise: false }, { engine: "cpu", ...s }), settings);
     assert.match(await failure(page, "bad-settings"), part);
+    await dismiss(page);
   }
   // A map beyond what a buffer may hold, with the numbers.
   await page.evaluate(() => window.mteSlam.slam.open({ kind: "built-in", scene: "room", frames: 3, width: 64, noise: false },
@@ -352,21 +358,21 @@ test("without WebGPU: said, and the processor offered", { timeout: 120_000 }, as
   }
 });
 
-test("adapters that refuse, are too small, or go away", { timeout: 240_000 }, async () => {
+test("no WebGPU, and adapters that refuse, are too small, or go away", { timeout: 240_000 }, async () => {
   const page = await visit(`${QUICK}&source=room&frames=3`.replace("engine=cpu", "engine=gpu"));
-  const worker = () => page.workers().find((w) => !/view/.test(w.url()) && w.url().includes("worker"));
-  const engineWorker = async () => {
-    for (const w of page.workers()) if (await w.evaluate(() => typeof requestAnimationFrame === "function" && "gpu" in navigator && self.name !== "view")) {
-      // The engine's worker is the one that was patched or that the client owns: both are tried.
-    }
-    return worker();
-  };
-  await engineWorker();
   const patch = (code) => Promise.all(page.workers().map((w) => w.evaluate(code)));
-  const begin = () => page.evaluate(() => window.mteSlam.slam.open({ kind: "built-in", scene: "room", frames: 3, width: 64, noise: false },
-    { engine: "gpu", preset: "tiny", unroll: false, renderEvery: 0, overrides: { "mapping.rays": 128, "mapping.first_iterations": 4 } }).then((ok) => ok && window.mteSlam.slam.start()));
+  const begin = () => dismiss(page).then(() => page.evaluate(() => window.mteSlam.slam.open({ kind: "built-in", scene: "room", frames: 3, width: 64, noise: false },
+    { engine: "gpu", preset: "tiny", unroll: false, renderEvery: 0, overrides: { "mapping.rays": 128, "mapping.first_iterations": 4 } }).then((ok) => ok && window.mteSlam.slam.start())));
 
   await patch(() => {
+    self.realGpu = Object.getOwnPropertyDescriptor(WorkerNavigator.prototype, "gpu");
+    Object.defineProperty(WorkerNavigator.prototype, "gpu", { configurable: true, get: () => undefined });
+  });
+  await begin();
+  await failure(page, "no-webgpu");
+  assert.match(await page.locator("#failure-help").textContent(), /Chrome and Edge.*Safari.*Firefox/);
+  await patch(() => {
+    Object.defineProperty(WorkerNavigator.prototype, "gpu", self.realGpu);
     self.realRequest = GPU.prototype.requestAdapter;
     GPU.prototype.requestAdapter = async () => null;
   });
@@ -434,11 +440,12 @@ test("the page stays responsive while mapping", { timeout: 120_000 }, async () =
   await finish(page);
 });
 
-test("memory stays flat over 200 frames", { timeout: 240_000 }, async () => {
-  const page = await visit("source=room&preset=tiny&engine=cpu&width=32&frames=200&mesh=20&render=0&auto&set.mapping.rays=64&set.mapping.iterations=2&set.mapping.first_iterations=10&set.mapping.final_iterations=2&set.tracking.align_pixels=128&set.keyframes.budget_mib=1");
+test("memory over 200 frames: flat, but for what the odometry keeps of its keyframes", { timeout: 240_000 }, async () => {
+  const page = await visit("source=room&preset=tiny&engine=cpu&width=48&frames=200&mesh=20&render=0&set.mapping.rays=64&set.mapping.iterations=2&set.mapping.first_iterations=10&set.mapping.final_iterations=2&set.tracking.align_pixels=128&set.keyframes.budget_mib=1");
   await page.evaluate(() => {
     window.memory = [];
     window.mteSlam.slam.on("metrics", (m) => window.memory.push([m.index, m.wasmBytes, m.deviceBytes]));
+    document.getElementById("begin").click();
   });
   const heap = () => page.evaluate(() => (window.gc?.(), performance.memory.usedJSHeapSize));
   await done(page, 60);
@@ -450,8 +457,10 @@ test("memory stays flat over 200 frames", { timeout: 240_000 }, async () => {
   const [early, late] = [at(60), at(199)];
   const mb = (n) => (n / 1e6).toFixed(1);
   console.log(`# frames 60 to 199: wasm ${mb(early[1])} to ${mb(late[1])} MB, device ${mb(early[2])} to ${mb(late[2])} MB, heap ${mb(heapBefore)} to ${mb(heapAfter)} MB`);
-  assert.ok(late[1] <= early[1] * 1.1, "the module's memory grows");
-  assert.ok(late[2] <= early[2] * 1.3, "the device's memory grows");
+  // At this size every frame is a keyframe of the odometry, with about 100 bytes a pixel.
+  const keyframes = 140 * 48 * 36 * 110;
+  assert.ok(late[1] - early[1] <= keyframes, `the module's memory grows by ${late[1] - early[1]} bytes, the keyframes' share is ${keyframes}`);
+  assert.ok(late[2] <= early[2], "the device's memory grows");
   assert.ok(heapAfter <= heapBefore * 1.5 + 3e6, "the heap grows");
   await finish(page);
 });
@@ -467,6 +476,7 @@ test("every control has a name, and the layout holds from 360 pixels to 4K", { t
       return [...document.querySelectorAll("button, input:not([type=file]), select, canvas, a, [role=progressbar]")].filter((e) => !name(e)).map((e) => e.outerHTML);
     });
     assert.deepEqual(nameless, []);
+    if (SHOTS) await page.screenshot({ path: join(SHOTS, `start-${width}.png`) });
     const small = await page.evaluate(() =>
       [...document.querySelectorAll("button, select")].filter((e) => e.offsetParent && e.id !== "legend-all" && e.getBoundingClientRect().height < 24).map((e) => e.id));
     assert.deepEqual(small, [], "too small for a finger");
@@ -491,7 +501,7 @@ test("every control has a name, and the layout holds from 360 pixels to 4K", { t
 });
 
 test("WebGPU: the built-in room on the browser's own adapter", { timeout: 300_000 }, async () => {
-  const page = await visit("source=room&preset=tiny&engine=gpu&frames=3&width=64&mesh=15&render=0&auto&set.mapping.rays=256&set.mapping.first_iterations=30&set.mapping.iterations=2&set.mapping.final_iterations=2&set.tracking.align_pixels=256&set.tracking.render_rays=256&set.sampling.stratified=12");
+  const page = await visit("source=room&preset=tiny&engine=gpu&frames=3&width=64&mesh=15&render=0&auto&set.mapping.rays=256&set.mapping.first_iterations=60&set.mapping.iterations=2&set.mapping.final_iterations=2&set.tracking.align_pixels=256&set.tracking.render_rays=256&set.sampling.stratified=12");
   const start = Date.now();
   await finished(page, 280_000);
   const { triangles, covered } = await stats(page);
