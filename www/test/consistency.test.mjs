@@ -37,7 +37,8 @@ for (const engine of ["cpu", "gpu"]) {
     const kernels = await page.evaluate(() => window.reference.kernels());
     assert.ok(kernels.length >= 18, `${kernels.length} kernels`);
     for (const [i, name] of kernels.entries())
-      await t.test(name, async () => {
+      await t.test(name, async (t) => {
+        if ((await page.evaluate((i) => window.reference.cases(i), i)) === 0) return t.skip("no case yet");
         const difference = await page.evaluate(([engine, i]) => window.reference.check(engine, i), [engine, i]);
         assert.equal(difference, "");
       });

@@ -26,8 +26,10 @@ await Promise.all(shots.map(async ({ name, size: [width, height], scheme, query,
     const box = await page.locator("#view").boundingBox();
     await page.mouse.click(box.x + box.width * 0.5, box.y + box.height * 0.5);
   }
-  await page.waitForTimeout(1500);
-  await page.screenshot({ path: join(folder, `${name}.png`) });
+  // The view's thread has done all that was asked before it answers.
+  await page.evaluate(() => window.mteSlam.view.stats());
+  await page.waitForTimeout(3000);
+  await page.screenshot({ path: join(folder, `${name}.jpg`), type: "jpeg", quality: 86 });
 }));
 await browser.close();
 server.close();

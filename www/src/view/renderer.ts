@@ -556,7 +556,7 @@ export class Renderer {
     this.#target = scale(add(low, high), 0.5);
     const radius = length(sub(high, low)) / 2;
     const narrow = Math.min(1, this.#width / this.#height);
-    this.#distance = Math.max(0.8, (radius / Math.sin(FOV_Y / 2) / narrow) * 0.92);
+    this.#distance = Math.max(0.8, radius / Math.sin(FOV_Y / 2) / narrow);
   }
 
   /** A picture of the canvas's size that can be read back; the canvas itself may be multisampled. */
