@@ -56,6 +56,9 @@ function transport(): void {
   toggle.disabled = !open || (run.finished && !run.running);
   toggle.textContent = run.running ? "Pause" : run.finished ? "Done" : run.done > 0 ? "Resume" : "Start";
   stepButton.disabled = !open || run.running || run.finished;
+  const seek = input<HTMLInputElement>("seek");
+  seek.disabled = !open || run.running || run.done === 0;
+  seek.max = String(Math.max(0, run.done - 1));
   for (const button of element("exports").querySelectorAll("button")) {
     const classes = button.dataset.kind === "glb-classes";
     button.disabled = !open || run.done === 0 || (classes && run.opened!.classes.length === 0);
@@ -203,6 +206,8 @@ slam.on("frame", (event) => {
 });
 
 slam.on("rendered", (event) => {
+  input<HTMLInputElement>("seek").value = String(event.index);
+  element("seek-value").textContent = String(event.index);
   paint(element<HTMLCanvasElement>("out-color"), event.color, event.width, event.height);
   paint(element<HTMLCanvasElement>("out-depth"), event.depth, event.width, event.height);
   paint(element<HTMLCanvasElement>("out-classes"), event.classes, event.width, event.height);
@@ -258,6 +263,10 @@ function note(text: string): void {
 
 toggle.onclick = () => void (run.running ? slam.pause() : slam.start());
 stepButton.onclick = () => void slam.step();
+input<HTMLInputElement>("seek").oninput = (e) => {
+  element("seek-value").textContent = (e.target as HTMLInputElement).value;
+};
+input<HTMLInputElement>("seek").onchange = (e) => void slam.seekView({ frame: (e.target as HTMLInputElement).valueAsNumber });
 element("new-run").onclick = newRun;
 element("back").onclick = () => {
   show(form, false);

@@ -122,6 +122,14 @@ test("a first visit: start the built-in room, watch it grow, use everything", { 
   await page.locator("#step").click();
   await done(page, held + 1);
 
+  // An earlier frame's view of the map.
+  await page.waitForFunction(() => !document.getElementById("seek").disabled);
+  const pixels = () => page.evaluate(() => document.getElementById("out-color").toDataURL());
+  const shown = await pixels();
+  await page.locator("#seek").fill("1");
+  await page.waitForFunction((old) => document.getElementById("out-color").toDataURL() !== old, shown);
+  assert.equal(await page.locator("#seek-value").textContent(), "1");
+
   // Pixels of the view, then orbit by mouse and by keyboard.
   const first = await stats(page);
   assert.ok(first.triangles > 500 && first.covered > 0.03, JSON.stringify(first));

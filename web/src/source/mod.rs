@@ -13,7 +13,7 @@ pub use zip::ZipSource;
 /// Larger than any file of a recording that is read as a whole \[bytes\].
 pub(crate) const MAX_FILE_BYTES: u64 = 256 << 20;
 
-/// An archive or a folder on a server, at an absolute address.
+/// The last part of an address, as a name.
 pub(crate) fn last_part(url: &str) -> String {
     let path = url.split(['?', '#']).next().unwrap_or(url);
     let name = path.trim_end_matches('/').rsplit('/').next().unwrap_or(path);
