@@ -484,6 +484,14 @@ test("every control has a name, and the layout holds from 360 pixels to 4K", { t
       return [...document.querySelectorAll("button, input:not([type=file]), select, canvas, a, [role=progressbar]")].filter((e) => !name(e)).map((e) => e.outerHTML);
     });
     assert.deepEqual(nameless, []);
+    const cut = await page.evaluate(() => {
+      for (const id of ["toggle", "step", "tools", "new-run"]) document.getElementById(id).hidden = false;
+      document.getElementById("status").textContent = "Optimising the map, 100 %";
+      document.getElementById("eta").textContent = "100 of 120 frames, about 3 min 20 s left";
+      const place = (id) => document.getElementById(id).getBoundingClientRect();
+      return ["eta", "status", "progress", "step", "truth-shown", "theme"].filter((id) => place(id).right > innerWidth + 0.5);
+    });
+    assert.deepEqual(cut, [], `${width}: beyond the right edge`);
     if (SHOTS) await page.screenshot({ path: join(SHOTS, `start-${width}.png`) });
     const small = await page.evaluate(() =>
       [...document.querySelectorAll("button, select")].filter((e) => e.offsetParent && e.id !== "legend-all" && e.getBoundingClientRect().height < 24).map((e) => e.id));
