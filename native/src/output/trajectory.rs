@@ -3,7 +3,7 @@
 use anyhow::{Context, Result, bail};
 use glam::{DQuat, DVec3};
 use mte_slam_core::pose::Pose;
-pub use mte_slam_core::trajectory_file::{stamp, write_tum};
+pub use mte_slam_core::trajectory_file::write_tum;
 
 /// Read such a file; `name` is for messages.
 pub fn read_tum(name: &str, text: &str) -> Result<Vec<(f64, Pose)>> {
