@@ -7,7 +7,7 @@ use crate::{
     recorded::Outcome,
 };
 use mte_slam_core::{
-    config::Config,
+    config::{Config, Tracker},
     engine::{Engine, EngineError},
     pose::Pose,
     sequence::Sequence,
@@ -85,8 +85,11 @@ pub async fn short_run(engine: Engine) -> Result<Vec<Pose>, SlamError> {
     config.mapping.iterations = 4;
     config.mapping.final_iterations = 4;
     config.sampling.stratified = 16;
-    config.tracking.align_pixels = 512;
+    // The tracker whose poses are computed on the engine from first to last: `align` may leave them
+    // to the odometry, which is the host's everywhere.
+    config.tracking.tracker = Tracker::Render;
     config.tracking.render_rays = 256;
+    config.tracking.render_iterations = 4;
     let info = sequence.info().clone();
     let mut slam = Slam::new(engine, config, &info).await?;
     for index in 0..info.frames {
