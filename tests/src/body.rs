@@ -67,7 +67,7 @@ pub async fn check_cases(
 }
 
 /// How far a frame's position may be off between two worlds \[m\]. They round differently, and
-/// an optimisation carries that on: measured up to 0.02 mm.
+/// an optimisation carries that on.
 pub const TRAJECTORY_TOLERANCE_M: f64 = 1e-3;
 
 /// A short run of the built-in sequence, small enough for a software adapter in a browser: the
