@@ -4,6 +4,7 @@
 #
 # MTE_SLAM_REQUIRE_GPU=1      tests that find no adapter fail instead of using the CPU engine alone
 # MTE_SLAM_REQUIRE_TARGETS=1  fail, not skip, where no compiler for the two other targets can be had
+# MTE_SLAM_REQUIRE_BROWSER=1  fail, not skip, where there is no Chromium or no Node
 # MTE_SLAM_CROSS              see scripts/wasm-toolchain.sh
 set -eu
 cd "$(dirname "$0")/.."
@@ -56,9 +57,14 @@ fi
 step "examples in the documentation"
 cargo test --locked --workspace --doc
 
-# Last, so that a reader's eye falls on the results.
 step "tests"
 cargo test --locked --workspace --all-targets --no-fail-fast
+
+# The page and the kernels in a browser. Needs the compiler for wasm32 from above.
+if [ $cross -eq 0 ]; then
+    step "tests in a browser"
+    ./scripts/test-web.sh
+fi
 
 step ""
 echo "== all checks passed in $(($(date +%s) - started)) s"

@@ -27,3 +27,4 @@ pub mod shader;
 pub mod slam;
 pub mod synth;
 pub mod track;
+pub mod trajectory_file;

@@ -100,6 +100,14 @@ pub enum Command {
         Example:\n    mte-slam synth data/room --frames 200 && mte-slam run data/room"
     )]
     Synth(SynthArgs),
+    /// Serve the page and a recording, frame by frame, to a browser on this machine
+    #[command(
+        long_about = "Serve the page and a recording to a browser on this machine. The recording is \
+        read and decoded here, in any layout that `run` knows, and streamed frame by frame, no \
+        faster than the browser uses it. Nothing else of the disk can be reached.\n\n\
+        Examples:\n    mte-slam serve data/room0\n    mte-slam serve data/kitchen --scale 0.5 --port 9000"
+    )]
+    Serve(ServeArgs),
     /// List adapters, their limits, and which engine `auto` would take
     Info(InfoArgs),
     /// Measure the kernels: milliseconds per stage and per iteration
@@ -383,6 +391,26 @@ pub struct SynthArgs {
     /// Image width in pixels; the height is three quarters of it.
     #[arg(long, value_name = "PIXELS", default_value = "320", value_parser = picture_width)]
     pub width: u32,
+}
+
+/// `serve`.
+#[derive(Debug, Args)]
+pub struct ServeArgs {
+    /// Folder of the recording.
+    #[arg(value_name = "DATASET", value_hint = ValueHint::DirPath)]
+    pub dataset: PathBuf,
+    /// Port to listen at; 0 takes a free one.
+    #[arg(long, value_name = "PORT", default_value_t = 8080)]
+    pub port: u16,
+    /// Address to listen at. Any other than this machine's own lets others read the recording.
+    #[arg(long, value_name = "IP", default_value = "127.0.0.1")]
+    pub address: std::net::IpAddr,
+    /// Folder of the built page [default: www/dist here or above the program].
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub page: Option<PathBuf>,
+    /// Which part of the recording, and how it is read.
+    #[command(flatten)]
+    pub selection: SelectionArgs,
 }
 
 /// `info`.

@@ -14,6 +14,7 @@ mod pipeline;
 mod progress;
 mod record;
 mod screen;
+mod server;
 mod source;
 
 use args::{Cli, Command};
@@ -30,6 +31,7 @@ fn main() -> ExitCode {
         Command::Mesh(args) => commands::mesh::run(args, screen),
         Command::Render(args) => commands::render::run(args, screen),
         Command::Synth(args) => commands::synth::run(args, screen),
+        Command::Serve(args) => commands::serve::run(args, screen),
         Command::Info(args) => commands::info::run(args, screen),
         Command::Bench(args) => commands::bench::run(args, screen),
         Command::Shaders(args) => commands::shaders::run(args, screen),

@@ -139,7 +139,7 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
     }
 
     let saved = block_on(slam.checkpoint()).context("the map cannot be saved")?;
-    folder.write("checkpoint.safetensors", &checkpoint::write(&saved))?;
+    folder.write("checkpoint.safetensors", &saved.to_bytes())?;
     drop(saved);
     folder.write("timings.csv", write_csv(&timings).as_bytes())?;
     record.config_hash = configuration::hash(&effective.config)?;

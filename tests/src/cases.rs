@@ -71,7 +71,8 @@ fn tolerance(name: &str) -> Compare {
         "ray_state" => columns(RAY_STATE_FLOATS, &[STATE_ANCHOR as usize * 4], SUMS),
         "features" => columns(32, &[], SUMS),
         "position_gradient" => columns(4, &[], SUMS),
-        "poses" => columns(12, &[], 1e-6),
+        // WGSL grants sine and cosine little precision: 3e-6 off were seen in a browser.
+        "poses" => columns(12, &[], 1e-5),
         // Sums over all samples of a batch.
         "partials" => columns(1, &[], 2.0 * SUMS),
         "depths" | "distances" | "weights" | "distance_gradient" | "logits_gradient" => {

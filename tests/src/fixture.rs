@@ -367,20 +367,35 @@ pub fn run_words(
     buffers: &[Vec<u32>],
     workgroups: [u32; 3],
 ) -> Result<Vec<Vec<u32>>, EngineError> {
+    block_on(run_words_async(engine, kernel, params, buffers, workgroups))
+}
+
+/// As [`run_words`], for hosts that must not wait.
+pub async fn run_words_async(
+    engine: &mut Engine,
+    kernel: &'static Kernel,
+    params: &[u32],
+    buffers: &[Vec<u32>],
+    workgroups: [u32; 3],
+) -> Result<Vec<Vec<u32>>, EngineError> {
     let mut recording = Recording::new();
-    let mut bindings = Vec::new();
+    let mut ids = Vec::new();
     for (binding, data) in kernel.bindings.iter().zip(buffers) {
         let id = engine.create_buffer(binding.name, data.len())?;
         recording.upload(id, 0, data);
-        bindings.push(id);
+        ids.push(id);
     }
-    let params = params.to_vec();
-    let ids = bindings.clone();
+    let (bindings, params) = (ids.clone(), params.to_vec());
     recording.commands.push(Command::Dispatch { kernel, bindings, params, workgroups });
-    let outcome = engine.submit(&recording).and_then(|()| {
-        let read = |(id, data): (_, &Vec<u32>)| block_on(engine.read(id, 0, data.len()));
-        ids.iter().copied().zip(buffers).map(read).collect()
-    });
+    let mut outcome = engine.submit(&recording).map(|()| Vec::new());
+    for (id, data) in ids.iter().zip(buffers) {
+        if let Ok(all) = &mut outcome {
+            match engine.read(*id, 0, data.len()).await {
+                Ok(words) => all.push(words),
+                Err(error) => outcome = Err(error),
+            }
+        }
+    }
     ids.iter().for_each(|id| engine.destroy_buffer(*id));
     outcome
 }

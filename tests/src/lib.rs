@@ -1,6 +1,10 @@
 //! Test support: engines, and the comparison of a kernel's shader with its Rust twin.
+pub mod body;
+#[cfg(target_arch = "wasm32")]
+pub mod browser;
 pub mod cases;
 pub mod fixture;
+pub mod recorded;
 pub mod tokens;
 
 use bytemuck::Pod;

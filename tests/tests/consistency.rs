@@ -15,12 +15,15 @@ use mte_slam_core::{
 };
 use mte_slam_tests::{
     Compare, Mismatch, Tolerance,
+    body::{TRAJECTORY_TOLERANCE_M, check_cases, largest_gap_m, short_run},
     cases::{Case, cases, supervised, weight_layers},
     compare_outputs,
     fixture::{CLASSES, Options, POISON, State, run_words, words},
-    gpu_engine_with,
+    gpu_engine, gpu_engine_with,
+    recorded::Recorded,
     tokens::maintenance,
 };
+use pollster::block_on;
 
 fn run(engine: &mut Engine, case: &Case, buffers: &[Vec<u32>]) -> Vec<Vec<u32>> {
     run_words(engine, case.kernel, &case.params, buffers, case.workgroups)
@@ -42,27 +45,8 @@ fn check(kernel: &str) {
         engines.extend(gpu_engine_with(GpuOptions { overrides, ..Default::default() }));
     }
     for (which, engine) in engines.iter_mut().enumerate() {
-        for (case, expected) in cases.iter().zip(&expected) {
-            let found = run(engine, case, &case.buffers);
-            let context = |error: Mismatch| panic!("{}, engine {which}: {error:?}", case.name);
-            compare_outputs(case.kernel, expected, &found, &Tolerance(case.tolerance.clone()))
-                .unwrap_or_else(context);
-            if case.overwritten.is_empty() {
-                continue;
-            }
-            let mut dirty = case.buffers.clone();
-            for (binding, words) in case.kernel.bindings.iter().zip(&mut dirty) {
-                if case.overwritten.contains(&binding.name) {
-                    words.iter_mut().enumerate().for_each(|(i, w)| *w = 0x4b1d_0000 ^ i as u32);
-                }
-            }
-            let again = run(engine, case, &dirty);
-            for (i, binding) in case.kernel.bindings.iter().enumerate() {
-                let name = (case.kernel.name, case.name, binding.name);
-                assert!(again[i] == found[i], "{name:?} depends on what was there");
-                let partial = !case.overwritten.contains(&binding.name);
-                assert!(partial || !found[i].contains(&POISON), "{name:?} is not fully written");
-            }
+        if let Err(difference) = block_on(check_cases(engine, &cases, &expected)) {
+            panic!("engine {which}: {difference}");
         }
     }
     // Nothing is compared with itself: the kernel changes something in every case.
@@ -323,4 +307,36 @@ fn anchors_are_dropped_merged_and_spawned() {
         total.iter_mut().zip(counts).for_each(|(t, c)| *t += c);
     }
     assert!(total.iter().all(|n| *n > 3), "{total:?}");
+}
+
+/// A short run of the built-in sequence gives the same trajectory on both engines. (In a browser:
+/// `scripts/test-web.sh`.)
+#[test]
+fn both_engines_walk_the_same_path() {
+    let expected = block_on(short_run(Engine::cpu())).unwrap();
+    if let Some(gpu) = gpu_engine() {
+        let found = block_on(short_run(gpu)).unwrap();
+        let gap = largest_gap_m(&expected, &found);
+        println!("largest distance {gap:e} m");
+        assert!(gap < TRAJECTORY_TOLERANCE_M, "{gap} m apart");
+    }
+    let mut off = expected.clone();
+    off[3].translation.x += 2.0 * TRAJECTORY_TOLERANCE_M;
+    assert!(largest_gap_m(&expected, &off) > TRAJECTORY_TOLERANCE_M);
+    off[3].translation.x = f64::NAN;
+    assert!(largest_gap_m(&expected, &off).is_nan(), "NaN passes no comparison");
+}
+
+/// What is written for the browser reads back, and a cut is noticed.
+#[test]
+fn recorded_results_round_trip() {
+    let recorded = Recorded::make();
+    let bytes = recorded.to_bytes();
+    let back = Recorded::from_bytes(&bytes).unwrap();
+    for ((a, ra), (b, rb)) in recorded.kernels.iter().zip(&back.kernels) {
+        assert!(ra == rb && a.len() == b.len());
+        assert!(a.iter().zip(b).all(|(a, b)| a.buffers == b.buffers && a.params == b.params));
+    }
+    assert_eq!(recorded.poses, back.poses);
+    assert!(Recorded::from_bytes(&bytes[..bytes.len() - 8]).is_none());
 }

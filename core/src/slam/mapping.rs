@@ -218,6 +218,7 @@ impl Slam {
     /// among them) and others drawn from the keyframes `near`.
     async fn optimise(&mut self, near: &[usize], pass: Pass) -> Result<Losses, SlamError> {
         let Pass { iterations, rates, recent, fusion_steps, semantic } = pass;
+        let breathe = self.breathe;
         let m = self.config.mapping.clone();
         let s = self.config.sampling.clone();
         let mut loss = self.config.loss.clone();
@@ -316,6 +317,10 @@ impl Slam {
             if (i + 1) % ITERATIONS_PER_RECORDING == 0 || i + 1 == iterations {
                 device.engine.submit(&r)?;
                 r = Recording::default();
+                if let Some(breathe) = breathe {
+                    device.engine.synchronise().await?;
+                    breathe(i + 1, iterations).await;
+                }
             }
         }
         let losses = read_losses(device, rays, &loss).await?;

@@ -3,6 +3,8 @@
 //! [`Slam::process`] tracks a frame, maps it when it is due, and reports. Nothing here waits for a
 //! clock, a file or a thread: the host owns those.
 mod checkpoint;
+mod checkpoint_file;
+mod live;
 mod mapping;
 mod output;
 mod semantics;
@@ -12,6 +14,7 @@ mod tracking;
 mod tests;
 
 pub use checkpoint::{Checkpoint, Dtype, Tensor};
+pub use live::{LiveMesh, MeshChunk};
 pub use output::View;
 
 use crate::{
@@ -25,7 +28,8 @@ use crate::{
     recording::Recording,
     track::odometry::{ColourRegistration, Odometer, OdometryConfig, OdometryError},
 };
-use alloc::{borrow::Cow, format, string::String, vec::Vec};
+use alloc::{borrow::Cow, boxed::Box, format, string::String, vec::Vec};
+use core::{future::Future, pin::Pin};
 
 /// What a run could not do.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -140,9 +144,14 @@ pub(crate) struct Observation {
     pub depth: Vec<u16>,
 }
 
+/// Called between slices of a long optimisation with the iterations done and their number; work
+/// goes on when its future is ready. A host with an event loop returns to it here.
+pub type Breathe = fn(done: u32, total: u32) -> Pin<Box<dyn Future<Output = ()>>>;
+
 /// The system.
 pub struct Slam {
     config: Config,
+    breathe: Option<Breathe>,
     info: SequenceInfo,
     /// Before the first frame, whose depth may decide the bounds.
     engine: Option<Engine>,
@@ -179,6 +188,7 @@ impl Slam {
         config.validate()?;
         Ok(Slam {
             config,
+            breathe: None,
             info: info.clone(),
             engine: Some(engine),
             device: None,
@@ -200,6 +210,12 @@ impl Slam {
     /// Gives the system a clock \[s\]; without one reports carry no times.
     pub fn set_clock(&mut self, clock: fn() -> f64) {
         self.clock = Some(clock);
+    }
+
+    /// Cuts optimisations into slices of some iterations: after each the device's work is waited
+    /// for, and `breathe` is called.
+    pub fn set_breathe(&mut self, breathe: Breathe) {
+        self.breathe = Some(breathe);
     }
 
     /// Track a frame and, when it is due, map it.

@@ -6,5 +6,6 @@ pub mod info;
 pub mod mesh;
 pub mod render;
 pub mod run;
+pub mod serve;
 pub mod shaders;
 pub mod synth;
