@@ -1,9 +1,7 @@
 //! Interval weights, composited depth, opacity and features.
 use super::shared::{FLAG_DENSE, FLAG_MAP, FLAG_POSE, Grid, Ray, interval_alpha, phi};
 use super::{CpuDispatch, load_f32, store_f32};
-use crate::{
-    layout::{FieldParams, RAY_STATE_FLOATS, STATE_APPEARANCE, STATE_DEPTH, STATE_SEMANTIC},
-};
+use crate::layout::{FieldParams, RAY_STATE_FLOATS, STATE_APPEARANCE, STATE_DEPTH, STATE_SEMANTIC};
 
 kernel! {
     /// Weights of a ray's intervals (NeuS), composited depth, opacity and features.

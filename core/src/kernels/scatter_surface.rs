@@ -40,9 +40,8 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         let (quad, id, part) = (job % 4, (job / 4) % rays, job / (4 * rays));
         let (plane, level, modality) = (part % 3, (part / 3) % 2, part / 6);
         let ray = Ray::load(ray_words, id);
-        let unlabelled = ray.class() >= p.classes
-            && p.weight_compression == 0.0
-            && p.weight_feature == 0.0;
+        let unlabelled =
+            ray.class() >= p.classes && p.weight_compression == 0.0 && p.weight_feature == 0.0;
         let colourless = modality == 0 && p.weight_color == 0.0;
         if ray.masked() || colourless || (modality == 1 && unlabelled) {
             return;

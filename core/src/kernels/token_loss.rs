@@ -5,7 +5,9 @@ use super::{
     load_f32,
     shared::{class_logit, head_row},
     store_f32,
-    tokens::{COLOR_AT, FUSED_AT, LOGITS_AT, RAW_HISTOGRAM, RAW_MEAN, RAW_POINT, TokenParams, sixteen},
+    tokens::{
+        COLOR_AT, FUSED_AT, LOGITS_AT, RAW_HISTOGRAM, RAW_MEAN, RAW_POINT, TokenParams, sixteen,
+    },
 };
 use crate::layout::TARGET_FLOATS;
 #[cfg(not(feature = "std"))]
