@@ -108,6 +108,22 @@ pub enum Command {
         Examples:\n    mte-slam serve data/room0\n    mte-slam serve data/kitchen --scale 0.5 --port 9000"
     )]
     Serve(ServeArgs),
+    /// Measure what feature fusion and redundancy suppressor bring: neither, each, both, over seeds
+    #[command(
+        long_about = "Run SLAM on a labelled recording with neither of the two semantic modules, \
+        with multi-tier feature fusion (MTFF), with the feature redundancy suppressor (FRS) and \
+        with both, each over several seeds, and compare the classes rendered at estimated poses, \
+        without depth input, with the true labels. It matters most where the labels that the map \
+        learns from are imperfect (--labels): true labels leave the modules little to do.\n\n\
+        The output folder receives:\n    \
+        ablation.md     the tables: mean and standard deviation over the seeds, and parameters\n    \
+        ablation.json   the same with every seed's figures and the IoU of every class\n    \
+        runs/           a file a finished run; a second start takes up where the first one ended\n\n\
+        Examples:\n    \
+        mte-slam ablate data/room0 --labels segmented\n    \
+        mte-slam ablate data/room0 --labels segmented --seeds 3 --preset fast --frames 100 --out out/try"
+    )]
+    Ablate(AblateArgs),
     /// List adapters, their limits, and which engine `auto` would take
     Info(InfoArgs),
     /// Measure the kernels: milliseconds per stage and per iteration
@@ -411,6 +427,33 @@ pub struct ServeArgs {
     /// Which part of the recording, and how it is read.
     #[command(flatten)]
     pub selection: SelectionArgs,
+}
+
+/// `ablate`.
+#[derive(Debug, Args)]
+pub struct AblateArgs {
+    /// Folder of the recording.
+    #[arg(value_name = "DATASET", value_hint = ValueHint::DirPath)]
+    pub dataset: PathBuf,
+    /// Seeds 1 to N for each of the four rows.
+    #[arg(long, value_name = "N", default_value = "5", value_parser = at_least_one)]
+    pub seeds: usize,
+    /// Output folder: empty, absent, or of an ablation that is to be continued [default:
+    /// out/DATASET-PRESET-ablation].
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub out: Option<PathBuf>,
+    /// Render and score every K-th frame.
+    #[arg(long, value_name = "K", default_value = "5", value_parser = at_least_one)]
+    pub render_every: usize,
+    /// Which part of the recording, and how it is read.
+    #[command(flatten)]
+    pub selection: SelectionArgs,
+    /// Configuration of all rows; the two modules and the seed are set by the ablation.
+    #[command(flatten)]
+    pub config: ConfigArgs,
+    /// Engine.
+    #[command(flatten)]
+    pub engine: EngineArgs,
 }
 
 /// `info`.

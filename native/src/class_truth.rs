@@ -100,6 +100,21 @@ impl ClassTruth {
         Ok(labels.map(|l| mapped(&l, &self.from_truth)))
     }
 
+    /// Whether any of the `frames` has a true label.
+    pub fn has_labels(&mut self, input: &mut dyn Sequence, frames: &[usize]) -> Result<bool> {
+        for &index in frames {
+            let labels = match &mut self.source {
+                Source::None(_) => return Ok(false),
+                Source::Input => input.labels(index)?,
+                Source::Own(sequence) => sequence.labels(index)?,
+            };
+            if labels.is_some_and(|l| l.iter().any(|c| *c != UNLABELLED)) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
     /// Classes of the map's, or of its labels, in those of `table`.
     pub fn of_map(&self, classes: &[u8]) -> Vec<u8> {
         mapped(classes, &self.from_map)

@@ -88,6 +88,11 @@ impl ViewScores {
         &mut self.truth
     }
 
+    /// The truth back, for the scores of another map.
+    pub fn into_truth(self) -> ClassTruth {
+        self.truth
+    }
+
     /// A frame as the map was trained with it, and its true labels likewise: resampled to the depth
     /// camera where the colour camera has another focal length.
     pub fn registered<'a>(

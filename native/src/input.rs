@@ -1,7 +1,13 @@
 //! Opening what is read.
 use crate::{
-    args::SelectionArgs, class_truth::ClassTruth, errors::usage, evaluation::MeshTruth,
-    screen::Screen, source::FolderSource,
+    args::{ConfigArgs, SelectionArgs},
+    class_truth::ClassTruth,
+    configuration::{self, Effective},
+    errors::usage,
+    evaluation::MeshTruth,
+    record::RunRecord,
+    screen::Screen,
+    source::FolderSource,
 };
 use anyhow::{Result, anyhow};
 use mte_slam_core::{
@@ -12,7 +18,76 @@ use mte_slam_core::{
     sequence::Sequence,
     synth::{SyntheticMesh, SyntheticOptions, SyntheticSequence},
 };
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// A recording, how it is to be processed, and what its classes are scored against.
+pub struct Prepared {
+    /// The recording.
+    pub sequence: Box<dyn Sequence>,
+    /// The configuration.
+    pub effective: Effective,
+    /// Labels that classes are scored against.
+    pub class_truth: ClassTruth,
+    /// How it was opened.
+    pub record: RunRecord,
+}
+
+/// Open a recording with the configuration that the flags, or else its layout, ask for.
+pub fn prepare(
+    dataset: &Path,
+    selection: &SelectionArgs,
+    config: &ConfigArgs,
+    screen: Screen,
+) -> Result<Prepared> {
+    // Everything that can be wrong with the command line comes before anything slow.
+    let named = config.preset.is_some();
+    let early = configuration::effective(config, "replica")?;
+    let sequence = open(dataset, selection, screen)?;
+    let info = sequence.info();
+    let default_preset = preset_of_layout(info.layout);
+    let effective = if named || default_preset == early.preset {
+        early
+    } else {
+        configuration::effective(config, default_preset)?
+    };
+    let class_truth = if info.classes.is_empty() {
+        ClassTruth::none("there are no labels", info)
+    } else {
+        open_truth(dataset, selection, info)?
+    };
+    let record = RunRecord {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        preset: effective.preset.clone(),
+        dataset: dataset.display().to_string(),
+        layout: info.layout.to_owned(),
+        start: selection.start,
+        stride: selection.stride,
+        frames: info.frames,
+        scale: selection.scale,
+        labels: selection.labels.clone(),
+        truth_labels: class_truth.name.clone(),
+        classes: selection.classes.classes.clone(),
+        unlabelled: selection.classes.unlabelled,
+        ..RunRecord::default()
+    };
+    Ok(Prepared { sequence, effective, class_truth, record })
+}
+
+/// The preset that suits a layout.
+fn preset_of_layout(layout: &str) -> &'static str {
+    match layout {
+        // 7-Scenes is what ScanNet is: a real room at 30 Hz by a structured-light sensor.
+        "7scenes" => "scannet",
+        "tum" => "tum",
+        _ => "replica",
+    }
+}
+
+/// The folder's own name, also of `.` and `data/room/`.
+pub fn folder_name(path: &Path) -> String {
+    let whole: PathBuf = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    whole.file_name().map_or("recording".to_owned(), |n| n.to_string_lossy().into_owned())
+}
 
 /// Open a recording.
 pub fn open(path: &Path, selection: &SelectionArgs, screen: Screen) -> Result<Box<dyn Sequence>> {

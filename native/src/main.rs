@@ -33,6 +33,7 @@ fn main() -> ExitCode {
         Command::Synth(args) => commands::synth::run(args, screen),
         Command::Serve(args) => commands::serve::run(args, screen),
         Command::Info(args) => commands::info::run(args, screen),
+        Command::Ablate(args) => commands::ablate::run(args, screen),
         Command::Bench(args) => commands::bench::run(args, screen),
         Command::Shaders(args) => commands::shaders::run(args, screen),
     };

@@ -16,6 +16,7 @@ use crate::{
         timings::{Spread, Timing, write_csv},
         trajectory::write_tum,
     },
+    progress::Progress,
     record::{RunRecord, config_file},
     screen::Screen,
 };
@@ -23,7 +24,7 @@ use anyhow::{Context, Result};
 use glam::DVec3;
 use mte_slam_core::{
     classes::{ClassTable, UNLABELLED},
-    frame::SequenceInfo,
+    frame::{Frame, SequenceInfo},
     mesh::Mesh,
     pose::Pose,
     sequence::Sequence,
@@ -83,7 +84,10 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
         .context("the map cannot be set up")?;
     slam.set_clock(clock_s);
 
-    let (timings, labelled) = process(&mut slam, sequence.as_mut(), &record.dataset, screen)?;
+    let mut progress = screen.progress("tracking and mapping", info.frames);
+    let processed = process(&mut slam, sequence.as_mut(), &record.dataset, &mut progress)?;
+    progress.finish();
+    let Processed { timings, labelled, .. } = processed;
     record.colour_scale = slam.colour_registration().scale;
     // Without a single label the map's classes mean nothing: none are shown.
     let of_map = if labelled { info.classes.clone() } else { ClassTable::default() };
@@ -156,7 +160,7 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
 }
 
 /// Seconds since the first call, for the reports of the core (which has no clock of its own).
-fn clock_s() -> f64 {
+pub fn clock_s() -> f64 {
     static START: OnceLock<Instant> = OnceLock::new();
     START.get_or_init(Instant::now).elapsed().as_secs_f64()
 }
@@ -172,16 +176,25 @@ pub fn restore(out: &Path, engine: &EngineArgs, screen: Screen) -> Result<Slam> 
     Ok(slam)
 }
 
-/// Feed every frame; what each cost, and whether any pixel of any had a class.
-fn process(
+/// What [`process`] tells.
+pub struct Processed {
+    /// What each frame cost.
+    pub timings: Vec<Timing>,
+    /// Whether any pixel of any frame had a class.
+    pub labelled: bool,
+    /// Time of the last optimisation, over all keyframes \[s\].
+    pub finish_s: f64,
+}
+
+/// Feed every frame, then optimise once more; a step of `progress` a frame.
+pub fn process(
     slam: &mut Slam,
     sequence: &mut dyn Sequence,
     recording: &str,
-    screen: Screen,
-) -> Result<(Vec<Timing>, bool)> {
+    progress: &mut Progress,
+) -> Result<Processed> {
     let frames = sequence.info().frames;
     let mut labelled = false;
-    let mut progress = screen.progress("tracking and mapping", frames);
     let mut timings = Vec::with_capacity(frames);
     for index in 0..frames {
         let frame = sequence.frame(index).with_context(|| recording.to_owned())?;
@@ -204,9 +217,9 @@ fn process(
             progress.set(done, || message);
         }
     }
+    let begin = Instant::now();
     block_on(slam.finish()).context("the last optimisation failed")?;
-    progress.finish();
-    Ok((timings, labelled))
+    Ok(Processed { timings, labelled, finish_s: begin.elapsed().as_secs_f64() })
 }
 
 fn live_message(slam: &Slam, sequence: &dyn Sequence, report: &FrameReport) -> String {
@@ -325,17 +338,12 @@ fn render_views(
     let info = sequence.info().clone();
     let mut progress = screen.progress("rendering", chosen.len());
     for (i, estimate) in chosen.iter().enumerate() {
-        let frame = sequence.frame(estimate.frame).with_context(|| info.name.clone())?;
-        let mut view = block_on(slam.render(&estimate.world_from_camera, &info.camera))
-            .with_context(|| format!("rendering frame {}", estimate.frame))?;
+        let (frame, mut view) = render_frame(slam, sequence, estimate)?;
         let stem = format!("renders/{:06}", estimate.frame);
         write_view(&view, of_map, &mut |kind, bytes| {
             folder.write(&format!("{stem}.{kind}.png"), bytes)
         })?;
-        view.class = scores.truth().of_map(&view.class);
-        let (trained, labels) = scores.registered(&frame)?;
-        let mut trained = trained.into_owned();
-        scores.add(&trained, &view, labels.as_deref())?;
+        let (mut trained, labels) = score_view(scores, &frame, &mut view)?;
         let truth = scores.truth();
         let no_classes = ClassTable::default();
         trained.labels = trained.labels.map(|l| truth.of_map(&l));
@@ -362,6 +370,33 @@ fn render_views(
     }
     progress.finish();
     Ok(())
+}
+
+/// A frame, and its view from the map: at the estimated pose, without depth input.
+pub fn render_frame(
+    slam: &mut Slam,
+    sequence: &mut dyn Sequence,
+    estimate: &PoseEstimate,
+) -> Result<(Frame, View)> {
+    let name = sequence.info().name.clone();
+    let camera = sequence.info().camera;
+    let frame = sequence.frame(estimate.frame).with_context(|| name)?;
+    let view = block_on(slam.render(&estimate.world_from_camera, &camera))
+        .with_context(|| format!("rendering frame {}", estimate.frame))?;
+    Ok((frame, view))
+}
+
+/// Score a view, whose classes become those of the truth's table. Gives back the frame as the map
+/// was trained with it, and its true labels.
+pub fn score_view(
+    scores: &mut ViewScores,
+    frame: &Frame,
+    view: &mut View,
+) -> Result<(Frame, Option<Vec<u8>>)> {
+    view.class = scores.truth().of_map(&view.class);
+    let (trained, labels) = scores.registered(frame)?;
+    scores.add(&trained, view, labels.as_deref())?;
+    Ok((trained.into_owned(), labels))
 }
 
 /// Legend, and with figures the confusion matrix and the table of classes.

@@ -11,6 +11,8 @@ pub struct Progress {
     total: u64,
     /// When the first step was done: it often costs more than the others (first map, pipelines).
     first: Option<(u64, Instant)>,
+    /// Steps before the part that runs, and what that part is called.
+    part: (u64, String),
     shape: Shape,
 }
 
@@ -39,11 +41,22 @@ impl Progress {
         } else {
             Shape::Lines(0)
         };
-        Progress { what, total, first: None, shape }
+        Progress { what, total, first: None, part: (0, String::new()), shape }
     }
 
-    /// `done` of `total` is done; `message` tells how it goes.
+    /// A part called `name` begins: what is set from now on counts from `base`.
+    pub fn begin_part(&mut self, base: u64, name: String) {
+        self.part = (base, name);
+    }
+
+    /// `done` of `total` (or, after that of a part's base) is done; `message` tells how it goes.
     pub fn set(&mut self, done: u64, message: impl FnOnce() -> String) {
+        let done = self.part.0 + done;
+        let name = &self.part.1;
+        let message = || {
+            let message = message();
+            if name.is_empty() { message } else { format!("{name}  {message}") }
+        };
         let (first, since) = *self.first.get_or_insert((done, Instant::now()));
         match &mut self.shape {
             Shape::Silent => {}
@@ -65,6 +78,15 @@ impl Progress {
         }
     }
 
+    /// A line that stays, above the bar if there is one.
+    pub fn note(&self, text: &str) {
+        match &self.shape {
+            Shape::Silent => {}
+            Shape::Bar(bar) => bar.println(text),
+            Shape::Lines(_) => eprintln!("{text}"),
+        }
+    }
+
     /// Remove the bar.
     pub fn finish(self) {
         if let Shape::Bar(bar) = &self.shape {
@@ -74,6 +96,7 @@ impl Progress {
 
     /// Whether a message would be shown now: computing one may cost something.
     pub fn wants_message(&self, done: u64) -> bool {
+        let done = self.part.0 + done;
         match &self.shape {
             Shape::Silent => false,
             Shape::Bar(_) => true,

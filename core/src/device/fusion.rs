@@ -209,6 +209,17 @@ impl Fusion {
         Ok(fusion)
     }
 
+    /// Parameters that training moves: no padding, nor layers that the configuration leaves out.
+    pub fn trained_count(&self) -> usize {
+        let used = self.layers.iter().filter(|l| self.config.local || l.name != "depthwise");
+        used.map(|l| {
+            let outputs = if l.depthwise { 1 } else { l.outputs };
+            let biases = if l.bias == NO_BIAS { 0 } else { l.outputs };
+            (l.taps * l.taps * l.inputs * outputs + biases) as usize
+        })
+        .sum()
+    }
+
     /// Tokens of a frame.
     pub fn count(&self) -> usize {
         (self.columns * self.rows) as usize

@@ -7,6 +7,7 @@ mod checkpoint_file;
 mod live;
 mod mapping;
 mod output;
+mod parameters;
 mod semantics;
 mod tracking;
 
@@ -16,6 +17,7 @@ mod tests;
 pub use checkpoint::{Checkpoint, Dtype, Tensor};
 pub use live::{LiveMesh, MeshChunk};
 pub use output::View;
+pub use parameters::ParameterCounts;
 
 use crate::{
     config::{Config, ConfigError, Tracker},

@@ -1,4 +1,5 @@
 //! One file a subcommand.
+pub mod ablate;
 pub mod bench;
 pub mod demo;
 pub mod eval;

@@ -1,4 +1,5 @@
 //! Everything the program writes.
+pub mod ablation;
 pub mod checkpoint;
 pub mod classes;
 pub mod colormap;

@@ -1,0 +1,52 @@
+//! How many numbers the semantics of a map take.
+use super::{Slam, SlamError};
+use crate::layout::{CHANNELS, FEATURE};
+use serde::{Deserialize, Serialize};
+
+/// Numbers that decide a pixel's class, by part; padding is not counted. All zero without classes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ParameterCounts {
+    /// Features of the semantic planes, both resolutions.
+    pub semantic_planes: usize,
+    /// Decoder of composited semantic features, 32-32-16.
+    pub semantic_decoder: usize,
+    /// Class head on semantic features.
+    pub class_head: usize,
+    /// Feature fusion (0 when off).
+    pub fusion: usize,
+    /// Vectors of all anchors that there may be (0 when off).
+    pub anchors: usize,
+    /// Anchors in use.
+    pub anchors_in_use: usize,
+}
+
+impl ParameterCounts {
+    /// All parts together.
+    pub fn total(&self) -> usize {
+        self.semantic_planes + self.semantic_decoder + self.class_head + self.fusion + self.anchors
+    }
+}
+
+impl Slam {
+    /// Sizes of the parts that make classes.
+    ///
+    /// # Errors
+    /// [`SlamError::NoMap`] before the first frame, engine failures.
+    pub async fn parameters(&mut self) -> Result<ParameterCounts, SlamError> {
+        let device = self.device()?;
+        let classes = device.classes as usize;
+        if classes == 0 {
+            return Ok(ParameterCounts::default());
+        }
+        let in_use = device.read_anchor_counts().await?;
+        let inputs = 2 * CHANNELS;
+        Ok(ParameterCounts {
+            semantic_planes: device.semantic.floats,
+            semantic_decoder: inputs * inputs + inputs + inputs * FEATURE + FEATURE,
+            class_head: classes * (FEATURE + 1),
+            fusion: device.fusion.as_ref().map_or(0, |f| f.trained_count()),
+            anchors: device.suppressor.as_ref().map_or(0, |s| s.slots() as usize * FEATURE),
+            anchors_in_use: in_use.map_or(0, |c| c.alive as usize),
+        })
+    }
+}
