@@ -6,8 +6,6 @@ use super::{
     tokens::{TILE, TokenParams, dot, sixteen},
 };
 use alloc::vec::Vec;
-#[cfg(not(feature = "std"))]
-use num_traits::Float as _;
 
 kernel! {
     /// Adds dL/dK and dL/dV. After `attend_queries`.

@@ -5,8 +5,6 @@ use super::{
     load_f32, store_f32,
     tokens::{NO_RESIDUAL, TILE, TokenParams, dot, sixteen},
 };
-#[cfg(not(feature = "std"))]
-use num_traits::Float as _;
 
 kernel! {
     /// Adds dL/dQ and dL/d(residual); keeps sum of output x gradient for `attend_keys`.

@@ -6,8 +6,6 @@ use super::{
     load_f32, store_f32,
     tokens::{FUSED_AT, GATE_AT, GEOMETRY_AT, TokenParams, dot, sixteen},
 };
-#[cfg(not(feature = "std"))]
-use num_traits::Float as _;
 
 kernel! {
     /// From dL/dF to the gate's convolution and the three modalities.
