@@ -529,7 +529,7 @@ impl Run {
                 semantic: l.semantic,
             }),
             keyframes: self.slam.keyframes().len(),
-            anchors: None,
+            anchors: self.slam.anchor_history().last().map(|(_, counts)| f64::from(counts.alive)),
             device_bytes: self.slam.memory_bytes() as f64,
             wasm_bytes: wasm_bytes(),
         };
