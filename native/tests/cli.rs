@@ -138,6 +138,7 @@ fn demo_writes_every_file_and_they_can_be_read() {
     assert_eq!(
         names(&out),
         [
+            "anchors.svg",
             "checkpoint.safetensors",
             "classes.csv",
             "config.toml",
