@@ -1,4 +1,5 @@
 // Raw features of each 8 x 8 sampled patch: geometry encoding, colours, class histogram. One invocation a token.
+#import shared/angle.wgsl
 #import shared/dispatch.wgsl
 #import shared/tokens.wgsl
 
@@ -101,8 +102,9 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
             var angle = world[k] * (3.14159265 / 8.0);
             for (var band = 0u; band < ${BANDS}u; band++) {
                 let to = out + 6u + band * 6u + k;
-                raw[to] = sin(angle);
-                raw[to + 3u] = cos(angle);
+                let wave = sin_cos(angle);
+                raw[to] = wave.x;
+                raw[to + 3u] = wave.y;
                 angle *= 2.0;
             }
         }

@@ -1,5 +1,7 @@
 // One Adam step on the pose of each window frame; one workgroup a frame, its rays summed in a fixed order.
 // The pose with the smallest loss so far is kept beside (the loss belongs to the pose before the step).
+#import shared/angle.wgsl
+
 struct Params {
     rays_per_frame: u32,
     // 1: forget moments and best pose first.
@@ -15,7 +17,7 @@ struct Params {
 @group(0) @binding(2) var<storage, read> ray_out: array<vec4f>;
 @group(0) @binding(3) var<storage, read> window: array<u32>;
 @group(0) @binding(4) var<storage, read_write> poses: array<f32>;
-// 36 floats a slot: moment1 (6), moment2 (6), best loss, best pose (12), loss of this step, gradient (6), steps.
+// 36 floats a slot: moment1 (6), moment2 (6), best loss, best pose (12), loss of this step, gradient (6), 1 - 0.9^t, 1 - 0.999^t of t steps.
 @group(0) @binding(5) var<storage, read_write> pose_state: array<f32>;
 
 var<workgroup> partial_v: array<vec4f, WORKGROUP_SIZE>;
@@ -59,11 +61,13 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(local_invocation_index) 
         }
         pose_state[s + 12u] = 3e38;
         pose_state[s + 32u] = 0.0;
+        pose_state[s + 33u] = 0.0;
     }
-    let steps = pose_state[s + 32u] + 1.0;
-    pose_state[s + 32u] = steps;
-    let correction1 = 1.0 / (1.0 - exp(steps * -0.105360516));
-    let correction2 = 1.0 / (1.0 - exp(steps * -0.0010005003));
+    // Adam's bias: a moment of ones. A difference from 1 would cancel where it is small.
+    let bias1 = 0.9 * pose_state[s + 32u] + 0.1;
+    let bias2 = 0.999 * pose_state[s + 33u] + 0.001;
+    pose_state[s + 32u] = bias1;
+    pose_state[s + 33u] = bias2;
     if (loss < pose_state[s + 12u]) {
         pose_state[s + 12u] = loss;
         for (var i = 0u; i < 12u; i++) {
@@ -80,7 +84,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(local_invocation_index) 
         pose_state[s + i] = m1;
         pose_state[s + 6u + i] = m2;
         let rate = select(params.learning_rate_rotation, params.learning_rate_translation, i < 3u);
-        step[i] = -rate * m1 * correction1 / (sqrt(m2 * correction2) + 1e-15);
+        step[i] = -rate * (m1 / bias1) / (sqrt(m2 / bias2) + 1e-15);
     }
     if ((window[frame] & 0x80000000u) != 0u) {
         return;
@@ -91,8 +95,10 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(local_invocation_index) 
     var a = 1.0;
     var b = 0.5;
     if (angle > 1e-6) {
-        a = sin(angle) / angle;
-        b = (1.0 - cos(angle)) / (angle * angle);
+        // (1 - cos) / angle^2 = (sin(angle / 2) / (angle / 2))^2 / 2, without its cancellation.
+        let half = sin_cos(0.5 * angle).x / (0.5 * angle);
+        a = sin_cos(angle).x / angle;
+        b = 0.5 * half * half;
     }
     for (var c = 0u; c < 3u; c++) {
         let r = vec3f(poses[p + c], poses[p + 3u + c], poses[p + 6u + c]);

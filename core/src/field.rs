@@ -138,7 +138,7 @@ pub fn initial_planes(floats: usize, seed: u32, salt: u32) -> Vec<f32> {
             // Box-Muller.
             let u = random_f32(seed, 0x1717, i, salt).max(1e-7);
             let v = random_f32(seed, 0x1718, i, salt);
-            0.01 * (-2.0 * u.ln()).sqrt() * (core::f32::consts::TAU * v).cos()
+            0.01 * (-2.0 * libm::logf(u)).sqrt() * libm::cosf(core::f32::consts::TAU * v)
         })
         .collect()
 }

@@ -15,6 +15,7 @@ use alloc::{
 
 /// Files that shaders may import.
 pub const SHARED: &[(&str, &str)] = &[
+    ("shared/angle.wgsl", include_str!("../../shaders/shared/angle.wgsl")),
     ("shared/appearance.wgsl", include_str!("../../shaders/shared/appearance.wgsl")),
     ("shared/dispatch.wgsl", include_str!("../../shaders/shared/dispatch.wgsl")),
     ("shared/geometry.wgsl", include_str!("../../shaders/shared/geometry.wgsl")),

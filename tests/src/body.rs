@@ -66,9 +66,11 @@ pub async fn check_cases(
     Ok(())
 }
 
-/// How far a frame's position may be off between two worlds \[m\]. They round differently, and
-/// an optimisation carries that on.
-pub const TRAJECTORY_TOLERANCE_M: f64 = 1e-3;
+/// How far a frame's position on a GPU may be off from the CPU engine's \[m\]. They round
+/// differently, and the optimiser's steps of 2 mm carry that on: gaps of 0.5 to 6 mm were seen, by
+/// seed and configuration. A pixel of the short run is 5 cm wide at the far wall. CPU engines
+/// agree bit for bit everywhere.
+pub const TRAJECTORY_TOLERANCE_M: f64 = 1e-2;
 
 /// A short run of the built-in sequence, small enough for a software adapter in a browser: the
 /// poses of its frames.
@@ -88,8 +90,9 @@ pub async fn short_run(engine: Engine) -> Result<Vec<Pose>, SlamError> {
     // The tracker whose poses are computed on the engine from first to last: `align` may leave them
     // to the odometry, which is the host's everywhere.
     config.tracking.tracker = Tracker::Render;
-    config.tracking.render_rays = 256;
-    config.tracking.render_iterations = 4;
+    // Steps cut short would end wherever rounding sent them.
+    config.tracking.render_rays = 1024;
+    config.tracking.render_iterations = 12;
     let info = sequence.info().clone();
     let mut slam = Slam::new(engine, config, &info).await?;
     for index in 0..info.frames {

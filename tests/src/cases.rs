@@ -403,10 +403,10 @@ fn pose_steps(o: &Options) -> Vec<Case> {
         weight_color: 5.0,
         weight_depth: 1.0,
     };
-    // A restart overwrites everything but the three unused words.
+    // A restart overwrites everything but the two unused words.
     let mut fresh = vec![POISON; FRAMES as usize * POSE_STATE_FLOATS];
     for slot in fresh.chunks_exact_mut(POSE_STATE_FLOATS) {
-        slot[33..].fill(0);
+        slot[34..].fill(0);
     }
     state.buffers.insert("pose_state", fresh);
     let with = |name, state: &State, restart| {

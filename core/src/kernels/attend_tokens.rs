@@ -3,8 +3,6 @@ use super::{
     CpuDispatch, load_f32, store_f32,
     tokens::{NO_RESIDUAL, TILE, TokenParams, dot, exp_negative, sixteen},
 };
-#[cfg(not(feature = "std"))]
-use num_traits::Float as _;
 
 kernel! {
     /// softmax(Q K^T / 4) V, and the log-sum-exp for the backward pass.
@@ -72,7 +70,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                 }
                 store_f32(&tokens[row + p.output as usize + c], x);
             }
-            store_f32(&tokens[row + p.statistics as usize], largest[i] + sum[i].ln());
+            store_f32(&tokens[row + p.statistics as usize], largest[i] + libm::logf(sum[i]));
         }
     });
 }

@@ -13,8 +13,6 @@ use crate::layout::{
     TARGET_FLOATS,
 };
 use core::sync::atomic::AtomicU32;
-#[cfg(not(feature = "std"))]
-use num_traits::Float as _;
 
 kernel! {
     /// Colour, semantic feature and classes of each ray; losses; gradients at the features.
@@ -158,11 +156,11 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             for c in 0..p.classes {
                 let l = logit(c);
                 if l > best {
-                    sum = sum * (best - l).exp() + 1.0;
+                    sum = sum * libm::expf(best - l) + 1.0;
                     best = l;
                     best_class = c;
                 } else {
-                    sum += (l - best).exp();
+                    sum += libm::expf(l - best);
                 }
                 if c == label {
                     own = l;
@@ -171,13 +169,13 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             let mut scale = 0.0;
             if label < p.classes {
                 let weight = class_weights[label as usize];
-                loss_semantic = weight * (sum.ln() + best - own);
+                loss_semantic = weight * (libm::logf(sum) + best - own);
                 scale = weight * p.weight_semantic * inv_rays;
             }
             let mut dfeature = [0.0; 16];
             for c in 0..p.classes {
                 let target = if c == label { 1.0 } else { 0.0 };
-                let g = scale * ((logit(c) - best).exp() / sum - target);
+                let g = scale * (libm::expf(logit(c) - best) / sum - target);
                 store_f32(&logits[id * p.classes as usize + c as usize], g);
                 let row = head_row(decoders, c);
                 for k in 0..16 {

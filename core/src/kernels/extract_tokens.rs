@@ -1,7 +1,7 @@
 //! Raw features of each patch of an image: geometry, colours, class histogram.
 use super::{
     CpuDispatch, load_f32,
-    shared::{Vec3, cross},
+    shared::{Vec3, cross, sin_cos},
     store_f32,
     tokens::{BANDS, RAW_GEOMETRY, RAW_HISTOGRAM, RAW_MEAN, RAW_PATCH, RAW_POINT, TokenParams},
 };
@@ -101,8 +101,9 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                 let mut angle = world[k] * (core::f32::consts::PI / 8.0);
                 for band in 0..BANDS {
                     let to = RAW_GEOMETRY + 6 + band * 6 + k as u32;
-                    put(to, angle.sin());
-                    put(to + 3, angle.cos());
+                    let [sin, cos] = sin_cos(angle);
+                    put(to, sin);
+                    put(to + 3, cos);
                     angle *= 2.0;
                 }
             }

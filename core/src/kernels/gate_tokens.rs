@@ -3,8 +3,6 @@ use super::{
     CpuDispatch, load_f32, store_f32,
     tokens::{FUSED_AT, GATE_AT, GEOMETRY_AT, TokenParams, sixteen},
 };
-#[cfg(not(feature = "std"))]
-use num_traits::Float as _;
 
 kernel! {
     /// Sigmoids of the gate's convolution, normalised to sum 1; F = the gated sum of G, S^, T_a.
@@ -17,7 +15,7 @@ kernel! {
 }
 
 pub(super) fn sigmoid(x: f32) -> f32 {
-    1.0 / (1.0 + (-x).exp())
+    1.0 / (1.0 + libm::expf(-x))
 }
 
 fn twin(dispatch: &CpuDispatch<'_>) {

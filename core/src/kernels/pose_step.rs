@@ -1,12 +1,12 @@
 //! One Adam step on the pose of each window frame.
-use super::shared::cross;
+use super::shared::{cross, sin_cos};
 use super::{CpuDispatch, load_f32, store_f32};
 use crate::layout::{RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_POSE};
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
 /// Floats a slot takes in `pose_state`: moments (6 + 6), best loss, best pose (12), loss of this
-/// step, gradient (6), steps taken, 3 unused.
+/// step, gradient (6), Adam's bias of both moments, 2 unused.
 pub const POSE_STATE_FLOATS: usize = 36;
 /// Index of the best loss in a frame's state.
 pub const POSE_BEST_LOSS: usize = 12;
@@ -71,12 +71,13 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             s[..12].iter().for_each(|x| store_f32(x, 0.0));
             store_f32(&s[POSE_BEST_LOSS], 3e38);
             store_f32(&s[32], 0.0);
+            store_f32(&s[33], 0.0);
         }
-        let steps = load_f32(&s[32]) + 1.0;
-        store_f32(&s[32], steps);
-        // 1 - 0.9^t and 1 - 0.999^t by their logarithms.
-        let correction1 = 1.0 / (1.0 - (steps * -0.105_360_516).exp());
-        let correction2 = 1.0 / (1.0 - (steps * -0.001_000_500_3).exp());
+        // Adam's bias: a moment of ones. A difference from 1 would cancel where it is small.
+        let bias1 = 0.9 * load_f32(&s[32]) + 0.1;
+        let bias2 = 0.999 * load_f32(&s[33]) + 0.001;
+        store_f32(&s[32], bias1);
+        store_f32(&s[33], bias2);
         if loss < load_f32(&s[POSE_BEST_LOSS]) {
             store_f32(&s[POSE_BEST_LOSS], loss);
             for k in 0..12 {
@@ -92,7 +93,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             store_f32(&s[k], m1);
             store_f32(&s[6 + k], m2);
             let rate = if k < 3 { p.learning_rate_translation } else { p.learning_rate_rotation };
-            step[k] = -rate * m1 * correction1 / ((m2 * correction2).sqrt() + 1e-15);
+            step[k] = -rate * (m1 / bias1) / ((m2 / bias2).sqrt() + 1e-15);
         }
         if window[frame as usize] & 0x8000_0000 != 0 {
             return;
@@ -101,8 +102,10 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         let angle = omega.iter().map(|x| x * x).sum::<f32>().sqrt();
         let (mut a, mut b) = (1.0, 0.5);
         if angle > 1e-6 {
-            a = angle.sin() / angle;
-            b = (1.0 - angle.cos()) / (angle * angle);
+            // (1 - cos) / angle^2 = (sin(angle / 2) / (angle / 2))^2 / 2, without its cancellation.
+            let half = sin_cos(0.5 * angle)[0] / (0.5 * angle);
+            a = sin_cos(angle)[0] / angle;
+            b = 0.5 * half * half;
         }
         for c in 0..3 {
             let r = [load_f32(&pose[c]), load_f32(&pose[3 + c]), load_f32(&pose[6 + c])];

@@ -1,8 +1,6 @@
 //! Twins of the imported shader parts (`shaders/shared/*.wgsl`): rays, random numbers, planes,
 //! decoders, interval weights. Same formulas in the same order; summation order may differ.
 use crate::layout::{FieldParams, GEOMETRY_FLOATS, HEAD_FLOATS, SURFACE_FLOATS};
-#[cfg(not(feature = "std"))]
-use num_traits::Float as _;
 
 /// Pixels are taken in order, not drawn.
 pub const FLAG_DENSE: u32 = 1;
@@ -105,6 +103,22 @@ impl Ray {
     /// Whether no loss may use the ray.
     pub fn masked(&self) -> bool {
         self.frame & RAY_MASKED != 0
+    }
+}
+
+/// Sine and cosine of an angle \[rad\] of up to some hundreds, to 1e-6 of 1, by the polynomials of
+/// `shaders/shared/angle.wgsl`: WGSL's own functions may be off by 2^-11.
+pub fn sin_cos(angle: f32) -> [f32; 2] {
+    let quarters = libm::floorf(angle * 0.636_619_77 + 0.5);
+    let r = ((angle - quarters * 1.570_312_5) - quarters * 4.837_513e-4) - quarters * 7.549_79e-8;
+    let z = r * r;
+    let s = r + r * z * (-0.166_666_55 + z * (8.332_161e-3 - z * 1.951_529_6e-4));
+    let c = 1.0 - 0.5 * z + z * z * (4.166_664_6e-2 + z * (-1.388_731_6e-3 + z * 2.443_315_7e-5));
+    match quarters as i32 & 3 {
+        0 => [s, c],
+        1 => [c, -s],
+        2 => [-s, -c],
+        _ => [-c, s],
     }
 }
 
@@ -312,7 +326,7 @@ pub fn geometry_decoder(w: &[f32], f: &Features) -> GeometryState {
     let h1 = relu(dense::<32, 16>(&w[..528], f));
     let h2 = relu(dense::<16, 16>(&w[528..800], &h1));
     let o: f32 = w[816] + (0..16).map(|k| w[800 + k] * h2[k]).sum::<f32>();
-    GeometryState { h1, h2, distance: o.tanh() }
+    GeometryState { h1, h2, distance: libm::tanhf(o) }
 }
 
 /// Deltas for dL/d(distance) = `g`.
@@ -341,7 +355,7 @@ pub fn color_hidden(w: &[f32], f: &Features) -> [f32; 32] {
 /// sRGB in 0..1.
 pub fn color_output(w: &[f32], h: &[f32; 32]) -> Vec3 {
     let o = dense::<32, 4>(&w[1056..], h);
-    core::array::from_fn(|k| 1.0 / (1.0 + (-o[k]).exp()))
+    core::array::from_fn(|k| 1.0 / (1.0 + libm::expf(-o[k])))
 }
 
 /// From the gradient at the colour's pre-activation to (hidden deltas, feature gradient).
@@ -381,7 +395,7 @@ pub fn class_logit(decoders: &[f32], feature: &[f32; 16], classes: u32, c: u32) 
 
 /// Light let through at a signed distance \[truncations\].
 pub fn phi(sharpness: f32, s: f32) -> f32 {
-    1.0 / (1.0 + (-sharpness * s).exp())
+    1.0 / (1.0 + libm::expf(-sharpness * s))
 }
 
 /// Opacity of the interval between two samples.

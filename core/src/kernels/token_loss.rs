@@ -10,8 +10,6 @@ use super::{
     },
 };
 use crate::layout::TARGET_FLOATS;
-#[cfg(not(feature = "std"))]
-use num_traits::Float as _;
 
 kernel! {
     /// Class-balanced cross-entropy and colour loss of F, their gradients, and the rays' targets.
@@ -64,17 +62,17 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         for c in 0..p.classes {
             let l = logit(c);
             let top = best.max(l);
-            sum = sum * (best - top).exp() + (l - top).exp();
+            sum = sum * libm::expf(best - top) + libm::expf(l - top);
             best = top;
             let t = histogram[c as usize] * class_weights[c as usize];
             mass += t;
             mean += t * l;
         }
-        let mut loss = p.weight_class * (mass * (best + sum.ln()) - mean);
+        let mut loss = p.weight_class * (mass * (best + libm::logf(sum)) - mean);
         let mut g = [0.0_f32; 16];
         for c in 0..p.classes {
             let t = histogram[c as usize] * class_weights[c as usize];
-            let d = p.weight_class * inv * (mass * (logit(c) - best).exp() / sum - t);
+            let d = p.weight_class * inv * (mass * libm::expf(logit(c) - best) / sum - t);
             store_f32(&gradient[row + (LOGITS_AT + c) as usize], d);
             let head = head_row(decoders, c);
             (0..16).for_each(|k| g[k] += d * head[k]);

@@ -75,7 +75,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             let rate = if p.rule == 1 {
                 count / (matches + count)
             } else {
-                1.0 - (1.0 - p.beta).powf(count)
+                1.0 - libm::powf(1.0 - p.beta, count)
             };
             for (cell, s) in anchor.iter().zip(sum) {
                 let step = rate * (s / count - load_f32(cell));

@@ -5,8 +5,6 @@ use crate::{
     frame::Frame,
 };
 use alloc::vec::Vec;
-#[cfg(not(feature = "std"))]
-use num_traits::Float as _;
 
 /// Classes never weigh more than this against the mean pixel.
 const MAX_CLASS_WEIGHT: f64 = 10.0;
@@ -29,7 +27,7 @@ impl ClassCounts {
     /// Weights by inverse frequency to the power of `balance`; the mean pixel weighs 1.
     pub fn weights(&self, balance: f64) -> Vec<f32> {
         let total: f64 = self.0.iter().sum();
-        let raw: Vec<f64> = self.0.iter().map(|n| (total / n.max(1.0)).powf(balance)).collect();
+        let raw: Vec<f64> = self.0.iter().map(|n| libm::pow(total / n.max(1.0), balance)).collect();
         let mean = raw.iter().zip(&self.0).map(|(w, n)| w * n).sum::<f64>() / total.max(1.0);
         raw.iter().map(|w| (w / mean.max(1e-9)).min(MAX_CLASS_WEIGHT) as f32).collect()
     }
