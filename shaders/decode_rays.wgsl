@@ -13,7 +13,7 @@
 @group(0) @binding(5) var<storage, read_write> logits_gradient: array<f32>;
 // Per anchor: vector (4) | class (bits, 255: free), matches, importance, variation | age.
 @group(0) @binding(6) var<storage, read> anchors: array<vec4f>;
-// Per slot and token: fused feature (4) | weight.
+// Per slot and token: fused feature (4) | weight, largest logit.
 @group(0) @binding(7) var<storage, read> targets: array<vec4f>;
 // Weight of each class in the cross-entropy.
 @group(0) @binding(8) var<storage, read> class_weights: array<f32>;
@@ -91,23 +91,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
             }
             own = select(own, logit, c == label);
         }
-        let labelled = label < params.classes;
-        var df: array<vec4f, 4>;
-        var class_weight = 0.0;
-        if (labelled) {
-            class_weight = class_weights[label];
-            loss_semantic = class_weight * (log(sum) + best - own);
-        }
-        let scale = class_weight * params.weight_semantic * inv_rays;
-        for (var c = 0u; c < params.classes; c++) {
-            let p = exp(class_logit(feature, c) - best) / sum;
-            let g = scale * (p - select(0.0, 1.0, c == label));
-            logits_gradient[ray * params.classes + c] = g;
-#for j in 0..4
-            df[${j}] += g * decoders[${HEAD_VEC4+j}u + c * 4u];
-#end
-        }
-        // Nearest anchor (paper eq. 9) and compression loss (10).
+        // Nearest anchor (paper eq. 9).
         var nearest = ${NO_ANCHOR}u;
         var nearest_class = 255u;
         var distance = 1e30;
@@ -134,6 +118,50 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
                 own_distance = d;
             }
         }
+        // The token of the ray's pixel, for its fused feature.
+        let fused = params.token_columns > 0u && (params.weight_feature > 0.0 || params.doubt_fused > 0.0);
+        var token = 0u;
+        if (fused) {
+            let pixel = r.label >> 8u;
+            let slot = (r.frame & 0x7fffffffu) >> 8u;
+            let column = min(pixel % params.width / params.token_size, params.token_columns - 1u);
+            let row = min(pixel / params.width / params.token_size, params.token_rows - 1u);
+            token = ((slot * params.token_rows + row) * params.token_columns + column) * ${TARGET_VEC4}u;
+        }
+        let labelled = label < params.classes;
+        var df: array<vec4f, 4>;
+        var class_weight = 0.0;
+        var trust = 1.0;
+        if (labelled) {
+            // What anchors doubt, the fused feature may vouch for.
+            let by_anchors = params.doubt_anchor > 0.0 && own_nearest != ${NO_ANCHOR}u;
+            var doubt = 0.0;
+            if (by_anchors) {
+                doubt = 1.0 - exp(params.doubt_anchor * (distance - own_distance));
+            }
+            if (fused && params.doubt_fused > 0.0) {
+                var aim: array<vec4f, 4>;
+#for j in 0..4
+                aim[${j}] = targets[token + ${j}u];
+#end
+                let gap = min(class_logit(aim, label) - targets[token + 4u].y, 0.0);
+                let fits = exp(params.doubt_fused * gap);
+                let weight = targets[token + 4u].x;
+                doubt = select(weight * (1.0 - fits), doubt * (1.0 - weight * fits), by_anchors);
+            }
+            trust = 1.0 - doubt;
+            class_weight = class_weights[label] * trust;
+            loss_semantic = class_weight * (log(sum) + best - own);
+        }
+        let scale = class_weight * params.weight_semantic * inv_rays;
+        for (var c = 0u; c < params.classes; c++) {
+            let p = exp(class_logit(feature, c) - best) / sum;
+            let g = scale * (p - select(0.0, 1.0, c == label));
+            logits_gradient[ray * params.classes + c] = g;
+#for j in 0..4
+            df[${j}] += g * decoders[${HEAD_VEC4+j}u + c * 4u];
+#end
+        }
         if ((params.flags & FLAG_ANCHORS) != 0u && nearest != ${NO_ANCHOR}u) {
             best_class = nearest_class;
         }
@@ -148,15 +176,11 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
             loss_feature += params.weight_compression * select(distance, own_distance, own);
         }
         // The fused feature of the pixel's token is the target of the feature loss.
-        if (!masked && params.weight_feature > 0.0 && params.token_columns > 0u) {
-            let pixel = r.label >> 8u;
-            let slot = (r.frame & 0x7fffffffu) >> 8u;
-            let column = min(pixel % params.width / params.token_size, params.token_columns - 1u);
-            let row = min(pixel / params.width / params.token_size, params.token_rows - 1u);
-            let at = ((slot * params.token_rows + row) * params.token_columns + column) * ${TARGET_VEC4}u;
-            let weight = params.weight_feature * targets[at + 4u].x;
+        if (!masked && fused) {
+            // With doubts, the fused feature teaches what the label is not trusted to.
+            let weight = params.weight_feature * targets[token + 4u].x * select(1.0, 1.0 - trust, params.doubt_fused > 0.0);
 #for j in 0..4
-            let t${j} = feature[${j}] - targets[at + ${j}u];
+            let t${j} = feature[${j}] - targets[token + ${j}u];
             df[${j}] += 2.0 * weight * inv_rays * t${j};
             loss_feature += weight * dot(t${j}, t${j});
 #end

@@ -39,21 +39,22 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     for (var c = 0u; c < params.classes; c++) {
         share = max(share, raw[source + ${RAW_HISTOGRAM}u + c]);
     }
-    targets[to + 4u] = vec4f(raw[source + ${RAW_POINT+3}u] * max(2.0 * share - 1.0, 0.0), 0.0, 0.0, 0.0);
+    var best = -1e30;
+    for (var c = 0u; c < params.classes; c++) {
+        best = max(best, logit(row, c));
+    }
+    targets[to + 4u] = vec4f(raw[source + ${RAW_POINT+3}u] * max(2.0 * share - 1.0, 0.0), best, 0.0, 0.0);
     if (params.train == 0u) {
         return;
     }
 
     let inv = 1.0 / f32(count);
-    var best = -1e30;
     var sum = 0.0;
     var mass = 0.0;
     var mean = 0.0;
     for (var c = 0u; c < params.classes; c++) {
         let l = logit(row, c);
-        let top = max(best, l);
-        sum = sum * exp(best - top) + exp(l - top);
-        best = top;
+        sum += exp(l - best);
         let t = raw[source + ${RAW_HISTOGRAM}u + c] * class_weights[c];
         mass += t;
         mean += t * l;

@@ -225,6 +225,11 @@ pub struct FusionConfig {
     pub weight: f64,
     /// The same while the semantics are trained alone, at the end.
     pub final_weight: f64,
+    /// Training steps in that stage, spread over its iterations.
+    pub final_steps: u32,
+    /// In that stage: how fast trust in a label falls with its logit below the best one at the
+    /// fused feature of the pixel; 0: every label is believed.
+    pub doubt: f64,
 }
 
 /// How anchors follow their features.
@@ -283,6 +288,10 @@ pub struct SuppressorConfig {
     pub min_importance: f64,
     /// Updates before an anchor may be dropped or merged.
     pub min_age: u32,
+    /// While the semantics are trained alone: how fast trust in a label falls with the (squared)
+    /// distance of its class's nearest anchor beyond that of the nearest one; 0: every label is
+    /// believed.
+    pub doubt: f64,
     /// What gives a rendered pixel its class.
     pub inference: Inference,
 }
@@ -351,7 +360,7 @@ impl Default for LossConfig {
             depth: 0.1,
             color: 5.0,
             semantic: 0.1,
-            balance: 0.0,
+            balance: 0.25,
         }
     }
 }
@@ -390,7 +399,7 @@ impl Default for MappingConfig {
             iterations: 15,
             first_iterations: 200,
             final_iterations: 100,
-            semantic_iterations: 400,
+            semantic_iterations: 1000,
             first_rate_factor: 5.0,
             rate_planes: 5e-3,
             rate_decoders: 1e-3,
@@ -428,7 +437,9 @@ impl Default for FusionConfig {
             weight_color: 0.5,
             balance: 0.5,
             weight: 0.0,
-            final_weight: 0.001,
+            final_weight: 0.003,
+            final_steps: 200,
+            doubt: 0.5,
         }
     }
 }
@@ -437,7 +448,7 @@ impl Default for SuppressorConfig {
     fn default() -> Self {
         SuppressorConfig {
             enabled: true,
-            anchors: 128,
+            anchors: 256,
             weight: 0.0,
             final_weight: 0.003,
             start: 1,
@@ -446,12 +457,13 @@ impl Default for SuppressorConfig {
             beta: 0.05,
             memory: 2000.0,
             decay: 0.999,
-            spawn_distance: 8.0,
-            merge_distance: 4.0,
+            spawn_distance: 4.0,
+            merge_distance: 2.0,
             spawns: 8,
             stable: 0.05,
             min_importance: 100.0,
             min_age: 40,
+            doubt: 1.0,
             inference: Inference::Head,
         }
     }
@@ -489,7 +501,6 @@ impl Config {
                 c.mapping.iterations = 10;
                 c.mapping.first_iterations = 120;
                 c.mapping.final_iterations = 40;
-                c.mapping.semantic_iterations = 240;
                 c.sampling.stratified = 20;
                 c.tracking.align_pixels = 2048;
             }
@@ -616,10 +627,12 @@ impl Config {
         not_negative("fusion.balance", f.balance)?;
         not_negative("fusion.weight", f.weight)?;
         not_negative("fusion.final_weight", f.final_weight)?;
+        not_negative("fusion.doubt", f.doubt)?;
         let a = &self.suppressor;
         count("suppressor.anchors", a.anchors, 256, "1 to 256")?;
         not_negative("suppressor.weight", a.weight)?;
         not_negative("suppressor.final_weight", a.final_weight)?;
+        not_negative("suppressor.doubt", a.doubt)?;
         for (field, x) in [("suppressor.beta", a.beta), ("suppressor.decay", a.decay)] {
             check((0.0..=1.0).contains(&x), field, format!("{x}"), "0 to 1")?;
         }

@@ -58,7 +58,7 @@ pub const FEATURE: usize = 16;
 pub const ANCHOR_FLOATS: usize = 24;
 /// No anchor.
 pub const NO_ANCHOR: u32 = 0xffff;
-/// Floats of a token's fused feature as the rays' target: feature (16) | weight, 0, 0, 0.
+/// Floats of a token's fused feature as the rays' target: feature (16) | weight, largest logit, 0, 0.
 pub const TARGET_FLOATS: usize = 20;
 /// Squared distance to an anchor that does not exist.
 pub const NO_DISTANCE: f32 = 1e30;
@@ -210,5 +210,13 @@ params! {
         token_size: u32,
         /// Floats a token's raw inputs take.
         raw_stride: u32,
+        /// How fast trust in a label falls with the squared distance of its nearest anchor.
+        doubt_anchor: f32,
+        /// How fast trust in a label falls with its logit at the pixel's fused feature.
+        doubt_fused: f32,
+        /// Unused.
+        spare0: u32,
+        /// Unused.
+        spare1: u32,
     }
 }

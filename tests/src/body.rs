@@ -86,6 +86,7 @@ pub async fn short_run(engine: Engine) -> Result<Vec<Pose>, SlamError> {
     config.mapping.first_iterations = 24;
     config.mapping.iterations = 4;
     config.mapping.final_iterations = 4;
+    config.mapping.semantic_iterations = 4;
     config.sampling.stratified = 16;
     // The tracker whose poses are computed on the engine from first to last: `align` may leave them
     // to the odometry, which is the host's everywhere.

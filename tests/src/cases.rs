@@ -198,10 +198,11 @@ pub fn cases(kernel: &str) -> Vec<Case> {
         "decode_rays" => vec![
             chained("classes", &DECODE_RAYS, &usual, &["ray_out", "logits_gradient"]),
             chained("no classes", &DECODE_RAYS, &classless, &["ray_out"]),
-            supervised("anchors", 19, FLAG_GUIDED | FLAG_MAP, 0.3, 0.0),
-            supervised("fused features", 0, FLAG_GUIDED | FLAG_MAP, 0.0, 0.7),
-            supervised("both", 19, FLAG_GUIDED | FLAG_MAP, 0.3, 0.7),
-            supervised("classes of anchors", 19, FLAG_DENSE | FLAG_ANCHORS, 0.0, 0.0),
+            supervised("anchors", 19, FLAG_GUIDED | FLAG_MAP, 0.3, 0.0, [0.0; 2]),
+            supervised("fused features", 0, FLAG_GUIDED | FLAG_MAP, 0.0, 0.7, [0.0; 2]),
+            supervised("both", 19, FLAG_GUIDED | FLAG_MAP, 0.3, 0.7, [0.0; 2]),
+            supervised("doubted labels", 19, FLAG_GUIDED | FLAG_MAP, 0.0, 0.0, [20.0, 0.4]),
+            supervised("classes of anchors", 19, FLAG_DENSE | FLAG_ANCHORS, 0.0, 0.0, [0.0; 2]),
         ],
         "mask_rays" => vec![
             case("tracking", &MASK_RAYS, &before(&MASK_RAYS, &tracking), &[]),
@@ -266,6 +267,7 @@ pub fn supervised(
     flags: u32,
     compression: f32,
     feature: f32,
+    doubt: [f32; 2],
 ) -> Case {
     let mut state = before(&DECODE_RAYS, &Options { flags, ..Options::default() });
     let mut decoded = state.clone();
@@ -286,12 +288,14 @@ pub fn supervised(
     state.buffers.insert("anchors", words);
     let p = &mut state.params;
     (p.anchors, p.weight_compression, p.weight_feature) = (anchors, compression, feature);
+    [p.doubt_anchor, p.doubt_fused] = doubt;
     (p.token_size, p.token_columns, p.token_rows) = (8, p.width / 8, p.height / 8);
     let mut words = Vec::new();
     for token in 0..FRAMES * p.token_columns * p.token_rows {
         words.extend(near(4 * token as usize));
         words.push(if token % 3 == 2 { 0.0_f32 } else { 1.0 }.to_bits());
-        words.extend([0; 3]);
+        // As large as logits of the features here: some labels are doubted, some are not.
+        words.extend([2.0_f32.to_bits(), 0, 0]);
     }
     state.buffers.insert("targets", words);
     case(name, &DECODE_RAYS, &state, &["ray_out", "logits_gradient"])

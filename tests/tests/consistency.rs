@@ -217,7 +217,7 @@ fn a_pass_over_dirty_buffers_gives_the_same() {
 #[test]
 fn anchors_and_fused_features_are_seen() {
     let decoded = |anchors, flags, compression, feature| {
-        let case = supervised("", anchors, flags, compression, feature);
+        let case = supervised("", anchors, flags, compression, feature, [0.0; 2]);
         let after = run(&mut Engine::cpu(), &case, &case.buffers);
         let rays: Vec<_> = case.buffers[0].chunks_exact(12).map(|r| (r[7], r[11])).collect();
         let at = STATE_ANCHOR as usize * 4;
@@ -252,11 +252,42 @@ fn anchors_and_fused_features_are_seen() {
     }
 }
 
+/// Doubt takes weight from a label whose anchors are further than others, from no other label; a
+/// fused feature that fits the label gives some of it back.
+#[test]
+fn labels_far_from_their_anchors_are_doubted() {
+    let labels = |doubt| {
+        let case = supervised("", 19, FLAG_GUIDED | FLAG_MAP, 0.0, 0.0, doubt);
+        let after = run(&mut Engine::cpu(), &case, &case.buffers);
+        let rays = case.buffers[0].chunks_exact(12).enumerate();
+        rays.filter_map(|(i, r)| {
+            let label = (r[11] & 255) as usize;
+            let state = &after[2][i * RAY_STATE_FLOATS + STATE_ANCHOR as usize * 4..];
+            let [any, own] = [state[1], state[2]].map(f32::from_bits);
+            let gradient = f32::from_bits(*after[4].get(i * CLASSES as usize + label)?);
+            (label < CLASSES as usize).then_some((any, own, gradient))
+        })
+        .collect::<Vec<_>>()
+    };
+    let (plain, by_anchors, by_both) = (labels([0.0; 2]), labels([20.0, 0.0]), labels([20.0, 0.4]));
+    let (mut doubted, mut vouched) = (0, 0);
+    for ((&(any, own, full), a), b) in plain.iter().zip(&by_anchors).zip(&by_both) {
+        let expected = if own < 1e30 { (20.0 * (any - own)).exp() } else { 1.0 };
+        assert!((a.2 - full * expected).abs() <= 1e-5 * full.abs(), "{a:?}, {full}, {expected}");
+        if expected < 1.0 {
+            assert!(b.2.abs() >= a.2.abs() && b.2.abs() <= full.abs());
+        }
+        doubted += u32::from(expected < 0.5);
+        vouched += u32::from(b.2.abs() > 1.05 * a.2.abs());
+    }
+    assert!(doubted > 5 && vouched > 5, "{doubted} doubted, {vouched} vouched for");
+}
+
 /// The pixel of a ray picks the token whose fused feature it is pulled to: columns across, rows
 /// down, the last of each also for the rest of the image, the frame's own slot.
 #[test]
 fn rays_are_pulled_to_the_token_of_their_pixel() {
-    let case = supervised("", 0, FLAG_GUIDED | FLAG_MAP, 0.0, 0.7);
+    let case = supervised("", 0, FLAG_GUIDED | FLAG_MAP, 0.0, 0.7, [0.0; 2]);
     let after = run(&mut Engine::cpu(), &case, &case.buffers);
     let float = |w: &u32| f64::from(f32::from_bits(*w));
     let mut tokens = Vec::new();

@@ -2,7 +2,7 @@
 //! which threads or workgroups run. The same of iterations that train the fusion and move anchors.
 use mte_slam_core::{
     config::{Config, LossConfig},
-    device::{Batch, Device, Rates},
+    device::{Batch, Device, Guidance, Rates},
     engine::Engine,
     kernels::shared::{FLAG_GUIDED, FLAG_MAP, FLAG_POSE},
     layout::ANCHOR_FLOATS,
@@ -54,8 +54,7 @@ fn map(engine: Engine) -> Vec<Vec<u32>> {
             loss: &loss,
             iteration,
             first: 0,
-            compression: 0.0,
-            feature: 0.0,
+            guidance: Guidance::default(),
         };
         let mut r = Recording::new();
         d.record_forward(&mut r, &batch);
@@ -177,8 +176,7 @@ fn fuse(engine: Engine) -> Vec<Vec<u32>> {
             loss: &loss,
             iteration,
             first: 0,
-            compression: 0.05,
-            feature: 0.1,
+            guidance: Guidance { compression: 0.05, feature: 0.1, ..Guidance::default() },
         };
         let mut r = Recording::new();
         d.record_fusion_step(&mut r, iteration % FRAMES, 1e-3);

@@ -3,7 +3,7 @@
 //! settings that are refused.
 use mte_slam_core::{
     config::{Config, FusionConfig, LossConfig},
-    device::{Batch, Device, Rates},
+    device::{Batch, Device, Guidance, Rates},
     engine::Engine,
     frame::Frame,
     kernels::{
@@ -235,8 +235,7 @@ fn batch(compression: f64, feature: f64) -> Batch<'static> {
         loss: &NO_LOSS,
         iteration: 5,
         first: 0,
-        compression,
-        feature,
+        guidance: Guidance { compression, feature, ..Guidance::default() },
     }
 }
 

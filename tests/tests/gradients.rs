@@ -9,7 +9,7 @@ use glam::DVec3;
 use mte_slam_core::{
     camera::Camera,
     config::{Config, LossConfig},
-    device::{Batch, Device, Rates, Trained},
+    device::{Batch, Device, Guidance, Rates, Trained},
     engine::Engine,
     frame::{Bounds, Frame},
     kernels::{
@@ -106,8 +106,7 @@ impl Problem {
             loss,
             iteration: 5,
             first: 0,
-            compression: 0.0,
-            feature: 0.0,
+            guidance: Guidance::default(),
         }
     }
 

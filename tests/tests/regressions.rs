@@ -1,7 +1,7 @@
 //! Mistakes known from other systems of this kind, on both engines.
 use mte_slam_core::{
     config::{Config, LossConfig},
-    device::{Batch, Device},
+    device::{Batch, Device, Guidance},
     engine::Engine,
     kernels::{
         adam::{ADAM, AdamParams},
@@ -229,8 +229,7 @@ fn a_reused_slot_forgets_the_pose_steps_of_its_former_frame() {
                 loss: &loss,
                 iteration,
                 first: 0,
-                compression: 0.0,
-                feature: 0.0,
+                guidance: Guidance::default(),
             };
             d.record_forward(r, &batch);
             d.record_backward(r, &batch);

@@ -9,11 +9,12 @@ use tsify::Tsify;
 pub const PRESETS: [&str; 5] = ["tiny", "fast", "replica", "scannet", "tum"];
 
 /// What differs from the preset `fast` in `tiny`.
-const TINY: [(&str, u32); 6] = [
+const TINY: [(&str, u32); 7] = [
     ("mapping.rays", 600),
     ("mapping.iterations", 6),
     ("mapping.first_iterations", 60),
     ("mapping.final_iterations", 20),
+    ("mapping.semantic_iterations", 120),
     ("tracking.align_pixels", 1024),
     ("sampling.stratified", 16),
 ];

@@ -89,10 +89,21 @@ pub struct Batch<'a> {
     pub iteration: u32,
     /// First pixel of a dense batch.
     pub first: u32,
+    /// What fusion and suppressor say about the rays' semantics.
+    pub guidance: Guidance,
+}
+
+/// How fusion and suppressor guide a batch's semantics; all zero: not at all.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Guidance {
     /// Weight of the compression loss.
     pub compression: f64,
     /// Weight of the feature loss.
     pub feature: f64,
+    /// How fast trust in a label falls with the squared distance of its nearest anchor.
+    pub doubt_anchor: f64,
+    /// How fast trust in a label falls with its logit at the pixel's fused feature.
+    pub doubt_fused: f64,
 }
 
 impl Batch<'_> {

@@ -46,8 +46,11 @@ impl Device {
         p.weight_depth = b.loss.depth as f32;
         p.weight_color = b.loss.color as f32;
         p.weight_semantic = b.loss.semantic as f32;
-        p.weight_compression = b.compression as f32;
-        p.weight_feature = b.feature as f32;
+        let g = &b.guidance;
+        p.weight_compression = g.compression as f32;
+        p.weight_feature = g.feature as f32;
+        p.doubt_anchor = g.doubt_anchor as f32;
+        p.doubt_fused = g.doubt_fused as f32;
         if b.flags & (FLAG_MAP | FLAG_ANCHORS) != 0 {
             p.anchors = self.suppressor.as_ref().map_or(0, |s| s.slots());
         }

@@ -94,7 +94,7 @@ fn nearest_anchor(p: &FieldParams, anchors: &[f32], feature: &[f32; 16], label: 
 
 /// The fused feature of the token that a ray's pixel lies in, and its weight.
 fn fused_target<'a>(p: &FieldParams, targets: &'a [f32], ray: &Ray) -> Option<&'a [f32]> {
-    if p.weight_feature == 0.0 || p.token_columns == 0 {
+    if p.token_columns == 0 || (p.weight_feature == 0.0 && p.doubt_fused == 0.0) {
         return None;
     }
     let pixel = ray.pixel();
@@ -166,9 +166,29 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                     own = l;
                 }
             }
-            let mut scale = 0.0;
+            let matched = nearest_anchor(&p, anchors, &feature, label);
+            let target = fused_target(&p, targets, &ray);
+            let (mut scale, mut trust) = (0.0, 1.0);
             if label < p.classes {
-                let weight = class_weights[label as usize];
+                // What anchors doubt, the fused feature may vouch for.
+                let by_anchors = p.doubt_anchor > 0.0 && matched.own_index != NO_ANCHOR;
+                let mut doubt = 0.0;
+                if by_anchors {
+                    let nearer = matched.distance - matched.own_distance;
+                    doubt = 1.0 - libm::expf(p.doubt_anchor * nearer);
+                }
+                if let Some(t) = target.filter(|_| p.doubt_fused > 0.0) {
+                    let aim = core::array::from_fn(|k| t[k]);
+                    let gap = (class_logit(decoders, &aim, p.classes, label) - t[17]).min(0.0);
+                    let fits = libm::expf(p.doubt_fused * gap);
+                    doubt = if by_anchors {
+                        doubt * (1.0 - t[16] * fits)
+                    } else {
+                        t[16] * (1.0 - fits)
+                    };
+                }
+                trust = 1.0 - doubt;
+                let weight = class_weights[label as usize] * trust;
                 loss_semantic = weight * (libm::logf(sum) + best - own);
                 scale = weight * p.weight_semantic * inv_rays;
             }
@@ -182,7 +202,6 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                     dfeature[k] += g * row[k];
                 }
             }
-            let matched = nearest_anchor(&p, anchors, &feature, label);
             if p.flags & FLAG_ANCHORS != 0 && matched.index != NO_ANCHOR {
                 best_class = matched.class;
             }
@@ -197,8 +216,10 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                     }
                     loss_feature += p.weight_compression * distance;
                 }
-                if let Some(target) = fused_target(&p, targets, &ray) {
-                    let weight = p.weight_feature * target[16];
+                if let Some(target) = target {
+                    // With doubts, the fused feature teaches what the label is not trusted to.
+                    let share = if p.doubt_fused > 0.0 { 1.0 - trust } else { 1.0 };
+                    let weight = p.weight_feature * target[16] * share;
                     for k in 0..16 {
                         let e = feature[k] - target[k];
                         dfeature[k] += 2.0 * weight * inv_rays * e;

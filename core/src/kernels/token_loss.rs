@@ -51,19 +51,19 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         }
         // A patch across a boundary has no feature that fits all its pixels.
         let share = histogram[..p.classes as usize].iter().fold(0.0_f32, |a, b| a.max(*b));
+        let logit = |c| class_logit(decoders, &feature, p.classes, c);
+        let best = (0..p.classes).map(logit).fold(-1e30_f32, f32::max);
         store_f32(&out[16], valid * (2.0 * share - 1.0).max(0.0));
-        (17..20).for_each(|k| store_f32(&out[k], 0.0));
+        store_f32(&out[17], best);
+        (18..20).for_each(|k| store_f32(&out[k], 0.0));
         if p.train == 0 {
             return;
         }
 
-        let logit = |c| class_logit(decoders, &feature, p.classes, c);
-        let (mut best, mut sum, mut mass, mut mean) = (-1e30_f32, 0.0_f32, 0.0, 0.0);
+        let (mut sum, mut mass, mut mean) = (0.0_f32, 0.0, 0.0);
         for c in 0..p.classes {
             let l = logit(c);
-            let top = best.max(l);
-            sum = sum * libm::expf(best - top) + libm::expf(l - top);
-            best = top;
+            sum += libm::expf(l - best);
             let t = histogram[c as usize] * class_weights[c as usize];
             mass += t;
             mean += t * l;

@@ -3,7 +3,7 @@ use super::semantics::steps_due;
 use super::{Losses, Observation, Slam, SlamError};
 use crate::{
     config::{RefinePoses, Tracker},
-    device::{Batch, Device, Rates, WINDOW_MAX},
+    device::{Batch, Device, Guidance, Rates, WINDOW_MAX},
     field::FieldShape,
     frame::{Bounds, Frame},
     kernels::shared::{FLAG_GUIDED, FLAG_MAP, FLAG_POSE, random_u32},
@@ -146,20 +146,42 @@ impl Slam {
             (m.final_iterations, false),
             (if self.info.classes.is_empty() { 0 } else { m.semantic_iterations }, true),
         ] {
+            if semantic && total > 0 {
+                self.refresh_targets()?;
+            }
             let mut left = total;
             while left > 0 {
                 let iterations = left.min(20);
                 let factor = 0.1 + 0.9 * f64::from(left) / f64::from(total);
                 let rates =
                     Rates { planes: m.rate_planes * factor, decoders: m.rate_decoders * factor };
-                let fusion_steps = self.config.fusion.steps * iterations / m.iterations.max(1);
-                let fusion_steps = if semantic { fusion_steps / 4 } else { fusion_steps };
+                let f = &self.config.fusion;
+                let fusion_steps = if semantic {
+                    let until = |left: u32| {
+                        u64::from(f.final_steps) * u64::from(total - left) / u64::from(total)
+                    };
+                    (until(left - iterations) - until(left)) as u32
+                } else {
+                    f.steps * iterations / m.iterations.max(1)
+                };
                 let pass = Pass { iterations, rates, recent: 0, fusion_steps, semantic };
                 self.optimise(&all, pass).await?;
                 left -= iterations;
             }
         }
         self.follow_odometer();
+        Ok(())
+    }
+
+    /// Fused features of every keyframe by what the fusion has learned since.
+    fn refresh_targets(&mut self) -> Result<(), SlamError> {
+        let slots: Vec<u32> = self.keyframes.iter().map(|k| k.slot).collect();
+        let device = self.device()?;
+        for slots in slots.chunks(ITERATIONS_PER_RECORDING as usize) {
+            let mut r = Recording::default();
+            slots.iter().for_each(|slot| device.record_fusion_forward(&mut r, *slot));
+            device.engine.submit(&r)?;
+        }
         Ok(())
     }
 
@@ -240,10 +262,20 @@ impl Slam {
         let first_iteration = self.iteration;
         self.iteration += iterations;
         let last_frame = self.keyframes.last().map_or(0, |k| k.frame);
-        let (compression, feature) = if semantic {
-            (self.config.suppressor.final_weight, self.config.fusion.final_weight)
+        let (fusion, suppressor) = (&self.config.fusion, &self.config.suppressor);
+        let guidance = if semantic {
+            Guidance {
+                compression: suppressor.final_weight,
+                feature: fusion.final_weight,
+                doubt_anchor: suppressor.doubt,
+                doubt_fused: fusion.doubt,
+            }
         } else {
-            (self.compression(&self.config.suppressor), self.feature(&self.config.fusion))
+            Guidance {
+                compression: self.compression(suppressor),
+                feature: self.feature(fusion),
+                ..Guidance::default()
+            }
         };
         let device = self.device()?;
         let mut touched = BTreeSet::new();
@@ -294,8 +326,7 @@ impl Slam {
                 loss: &loss,
                 iteration,
                 first: 0,
-                compression,
-                feature,
+                guidance,
             };
             rays = batch.frames * batch.rays_per_frame;
             device.record_forward(&mut r, &batch);

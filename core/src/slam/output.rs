@@ -4,7 +4,7 @@ use crate::{
     camera::Camera,
     classes::UNLABELLED,
     config::Inference,
-    device::Batch,
+    device::{Batch, Guidance},
     kernels::shared::{FLAG_ANCHORS, FLAG_DENSE},
     layout::RAY_OUT_FLOATS,
     mesh::{self, BlockMesher, ComponentSize, CullProtocol, Keep, Mesh, Visibility},
@@ -66,8 +66,7 @@ impl Slam {
                 loss: &loss,
                 iteration: 0,
                 first,
-                compression: 0.0,
-                feature: 0.0,
+                guidance: Guidance::default(),
             };
             let mut r = Recording::default();
             device.upload_pose(&mut r, VIEW_SLOT, pose);

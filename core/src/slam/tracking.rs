@@ -2,7 +2,7 @@
 use super::{PoseEstimate, Slam, SlamError, TrackingStatus, VIEW_SLOT};
 use crate::{
     config::Tracker,
-    device::Batch,
+    device::{Batch, Guidance},
     frame::Frame,
     kernels::{
         pose_step::POSE_BEST_LOSS,
@@ -136,8 +136,7 @@ impl Slam {
                 loss: &t.render_loss,
                 iteration: first_iteration + i,
                 first: 0,
-                compression: 0.0,
-                feature: 0.0,
+                guidance: Guidance::default(),
             };
             device.record_forward(&mut r, &batch);
             device.record_backward(&mut r, &batch);

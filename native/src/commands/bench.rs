@@ -10,7 +10,7 @@ use glam::DVec3;
 use mte_slam_core::{
     camera::Camera,
     config::Config,
-    device::{Batch, Device, Rates},
+    device::{Batch, Device, Guidance, Rates},
     engine::Engine,
     field::FieldShape,
     frame::{Bounds, Frame},
@@ -176,8 +176,7 @@ fn record(
         loss,
         iteration,
         first: 0,
-        compression: 0.0,
-        feature: 0.0,
+        guidance: Guidance::default(),
     };
     device.record_forward(r, &batch);
     device.record_backward(r, &batch);
