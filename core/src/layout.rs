@@ -210,5 +210,7 @@ params! {
         token_size: u32,
         /// Floats a token's raw inputs take.
         raw_stride: u32,
+        /// Samples of a ray that the per-sample head sees: all, or in views the first few that carry weight.
+        slots: u32,
     }
 }

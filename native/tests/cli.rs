@@ -428,16 +428,17 @@ fn an_ablation_compares_rows_over_seeds_and_resumes() {
     let noisy = ["--labels", "noisy", "--json"];
     let first = succeed(f, &arguments(&noisy));
     let progress = text(&first.stderr);
-    assert!(progress.contains("run 8/8 (both, seed 2)"), "{progress}");
+    assert!(progress.contains("run 12/12 (per-sample head, seed 2)"), "{progress}");
     let json: Value = serde_json::from_slice(&first.stdout).unwrap();
     let out = f.join("out");
     assert_eq!(names(&out), ["ablation.json", "ablation.md", "runs"]);
-    assert_eq!(names(&out.join("runs")).len(), 8);
+    assert_eq!(names(&out.join("runs")).len(), 12);
     assert_eq!(read(out.join("ablation.json")), text(&first.stdout));
     let number = |v: &Value| v.as_f64().unwrap_or_else(|| panic!("{v} is no number"));
     let rows = json["rows"].as_array().unwrap();
     let row_names: Vec<&str> = rows.iter().map(|r| r["name"].as_str().unwrap()).collect();
-    assert_eq!(row_names, ["neither", "MTFF", "FRS", "both"]);
+    let all = ["neither", "MTFF", "FRS", "both", "both, no local module", "per-sample head"];
+    assert_eq!(row_names, all);
     for row in rows {
         let runs = row["runs"].as_array().unwrap();
         let miou: Vec<f64> = runs.iter().map(|r| number(&r["classes"]["miou_percent"])).collect();
@@ -453,17 +454,25 @@ fn an_ablation_compares_rows_over_seeds_and_resumes() {
         assert_eq!(p["anchors"].as_u64() > Some(0), row["suppressor"] == true, "{p}");
         assert_eq!(p["anchors_in_use"].as_u64() > Some(0), row["suppressor"] == true, "{p}");
         let classes = json["sequence"]["classes"].as_u64().unwrap();
-        assert_eq!(p["class_head"].as_u64(), Some(17 * classes));
-        assert_eq!(p["semantic_decoder"].as_u64(), Some(32 * 32 + 32 + 32 * 16 + 16));
+        let per_sample = row["head"] == "sample";
+        let head = if per_sample { 33 * 256 + 2 * 257 * 256 + 257 * classes } else { 17 * classes };
+        assert_eq!(p["class_head"].as_u64(), Some(head));
+        let decoder = if per_sample { 0 } else { 32 * 32 + 32 + 32 * 16 + 16 };
+        assert_eq!(p["semantic_decoder"].as_u64(), Some(decoder));
     }
     let at = |row: usize| number(&rows[row]["figures"]["miou_percent"]["mean"]);
     assert!(at(0) != at(1) && at(0) != at(2) && at(1) != at(3), "every row is another");
+    assert!(at(3) != at(4) && at(0) != at(5), "every row is another");
+    let fusion = |row: usize| rows[row]["parameters"]["fusion"].as_u64().unwrap();
+    // The depthwise convolution: 3 x 3 and a bias for each of 16 channels.
+    assert_eq!(fusion(3) - fusion(4), 10 * 16);
     let gain = number(&rows[3]["figures"]["miou_gain_over_neither_points"]["mean"]);
     assert!((gain - (at(3) - at(0))).abs() < 1e-9);
     let accuracy = number(&json["input_labels"]["pixel_accuracy_percent"]);
     assert!((70.0..90.0).contains(&accuracy), "{accuracy}");
     let markdown = read(out.join("ablation.md"));
-    for line in ["| row ", "| input labels ", "| neither ", "| MTFF ", "| FRS ", "| both "] {
+    let lines = ["| row ", "| input labels ", "| neither ", "| both, no local module "];
+    for line in lines.iter().chain(&["| per-sample head ", "IoU of the thin and small classes"]) {
         assert!(markdown.contains(line), "{markdown}");
     }
 
@@ -477,12 +486,19 @@ fn an_ablation_compares_rows_over_seeds_and_resumes() {
     assert_eq!(kept["classes"]["miou_percent"], plain["semantics"]["miou_percent"]);
     assert_eq!(kept["ate_rmse_cm"], plain["trajectory"]["aligned_cm"]["rmse"]);
 
+    // Fewer rows: none is computed again, and gains need the first one.
+    let fewer = succeed(f, &arguments(&["--labels", "noisy", "--json", "--rows", "frs,neither"]));
+    let fewer: Value = serde_json::from_slice(&fewer.stdout).unwrap();
+    assert_eq!(fewer["rows"].as_array().unwrap().len(), 2);
+    assert_eq!(fewer["rows"][0]["figures"], rows[2]["figures"]);
+    fail(f, &arguments(&["--rows", "frs,frs"]), 2, &["--rows", "twice"]);
+
     // Started again, it computes what is missing and nothing else.
     let before = kept;
     fs::remove_file(out.join("runs/frs-2.json")).unwrap();
     let again = succeed(f, &arguments(&noisy));
     let progress = text(&again.stderr);
-    assert!(progress.contains("8 runs, 7 of them kept"), "{progress}");
+    assert!(progress.contains("12 runs, 11 of them kept"), "{progress}");
     assert!(progress.contains("(FRS, seed 2)") && !progress.contains("(both, seed 2)"));
     let after: Value = serde_json::from_str(&read(out.join("runs/frs-2.json"))).unwrap();
     assert_eq!(before["classes"], after["classes"]);

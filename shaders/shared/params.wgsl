@@ -28,6 +28,8 @@ struct Params {
     min_gradient: f32, weight_compression: f32, weight_feature: f32, anchors: u32,
     // Token grid of the fused features [tokens], edge of a token [pixels], floats of a token's raw inputs.
     token_columns: u32, token_rows: u32, token_size: u32, raw_stride: u32,
+    // Samples of a ray that the per-sample head sees.
+    slots: u32,
 }
 @group(0) @binding(0) var<uniform> params: Params;
 

@@ -3,7 +3,7 @@
 use crate::{
     Compare, TestRandom, f32_words,
     fixture::{self, CLASSES, FRAMES, Options, POISON, State, words, workgroups},
-    tokens,
+    samples, tokens,
 };
 use mte_slam_core::{
     engine::Engine,
@@ -254,7 +254,7 @@ pub fn cases(kernel: &str) -> Vec<Case> {
         "pose_step" => pose_steps(&usual),
         "query_points" => query_points(),
         "reduce_partials" => reduce_partials(),
-        _ => tokens::cases(kernel),
+        _ => samples::cases(kernel).unwrap_or_else(|| tokens::cases(kernel)),
     }
 }
 

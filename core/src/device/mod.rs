@@ -1,14 +1,16 @@
 //! The map's buffers on an engine, and the recordings of one pass over a batch of rays.
 mod fusion;
 mod passes;
+mod sample_head;
 mod suppressor;
 
 pub use fusion::{Fusion, Layer};
+pub use sample_head::{SampleHead, SampleLayer};
 pub use suppressor::{AnchorCounts, Suppressor};
 
 use crate::{
     camera::Camera,
-    config::{Config, LossConfig},
+    config::{Config, Head, LossConfig},
     engine::{Engine, EngineError},
     field::{FieldShape, decoder_floats, initial_decoders, initial_planes},
     frame::Frame,
@@ -151,6 +153,8 @@ pub struct Device {
     pub fusion: Option<Fusion>,
     /// Feature redundancy suppressor, where there are classes.
     pub suppressor: Option<Suppressor>,
+    /// The per-sample class head, where it is configured and there are classes.
+    pub sample_head: Option<SampleHead>,
     /// Number of classes.
     pub classes: u32,
     /// Steps Adam has taken.
@@ -205,7 +209,8 @@ impl Device {
         let pixels = camera.pixels();
         // An image smaller than a token has nothing to fuse.
         let targets = fusion::target_floats(&camera, &config.fusion);
-        let fused = classes > 0 && config.fusion.enabled && targets > 0;
+        let per_sample = classes > 0 && config.semantics.head == Head::Sample;
+        let fused = classes > 0 && config.fusion.enabled && targets > 0 && !per_sample;
         let targets = if fused { targets } else { 0 };
         let slot_bytes = pixels * 4 + pixels.div_ceil(2) * 4 + targets * 4;
         let by_limit = e.max_buffer_words() / pixels.max(targets);
@@ -255,8 +260,13 @@ impl Device {
             base.token_rows = f.rows;
             base.token_size = config.fusion.token_pixels;
         }
-        let suppressor = if classes > 0 && config.suppressor.enabled {
+        let suppressor = if classes > 0 && config.suppressor.enabled && !per_sample {
             Some(Suppressor::new(e, &config.suppressor, classes)?)
+        } else {
+            None
+        };
+        let sample_head = if per_sample {
+            Some(SampleHead::new(e, classes, trained_samples, max_rays, config.seed)?)
         } else {
             None
         };
@@ -268,6 +278,7 @@ impl Device {
             decoders: Trained::new(e, "decoders", decoder_floats(classes))?,
             fusion,
             suppressor,
+            sample_head,
             classes,
             step: 0,
             slots,
@@ -315,6 +326,11 @@ impl Device {
         device.upload_class_weights(&mut r, &equal, &equal);
         device.engine.submit(&r)?;
         Ok(device)
+    }
+
+    /// Classes that are decoded once a ray: none with a per-sample head.
+    fn ray_classes(&self) -> u32 {
+        if self.sample_head.is_some() { 0 } else { self.classes }
     }
 
     /// Largest batch a dense pass may have.
@@ -444,7 +460,14 @@ impl Device {
 
     /// 8 floats a point: distance, class (bits), 0, 0, red, green, blue, 0.
     pub async fn query_surface(&mut self, points: &[[f32; 4]]) -> Result<Vec<f32>, EngineError> {
-        self.query(points, FLAG_MAP, 8).await
+        let mut values = self.query(points, FLAG_MAP, 8).await?;
+        if self.sample_head.is_some() {
+            let classes = self.sample_classes(points).await?;
+            for (value, class) in values.chunks_exact_mut(8).zip(classes) {
+                value[1] = f32::from_bits(class);
+            }
+        }
+        Ok(values)
     }
 
     async fn query(
@@ -460,6 +483,7 @@ impl Device {
             let mut p = self.base;
             p.rays = chunk.len() as u32;
             p.flags = flags;
+            p.classes = self.ray_classes();
             r.dispatch_1d(
                 &QUERY_POINTS,
                 &p,

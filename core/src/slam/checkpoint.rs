@@ -269,6 +269,7 @@ fn parameters(device: &Device) -> Vec<(&'static str, Trained)> {
         ("decoders", device.decoders),
     ];
     all.extend(device.fusion.as_ref().map(|f| ("fusion", f.parameters)));
+    all.extend(device.sample_head.as_ref().map(|h| ("sample_head", h.parameters)));
     all
 }
 
