@@ -382,6 +382,12 @@ fn labels_without_any_class_leave_geometry_and_colour() {
     assert!(json["depth"]["l1_cm"].as_f64().unwrap().is_finite());
     assert!(f.join("out/mesh.ply").is_file() && !f.join("out/mesh_semantic.ply").exists());
     assert!(!f.join("out/renders/000000.class.png").exists());
+    // Nor do mesh and views of its checkpoint show classes.
+    succeed(f, &["mesh", "out", "--resolution", "0.1", "--engine", "cpu"]);
+    assert!(!f.join("out/mesh_semantic.ply").exists());
+    succeed(f, &["render", "out", "--frame", "1", "--engine", "cpu"]);
+    assert!(f.join("out/renders/000001.color.png").is_file());
+    assert!(!f.join("out/renders/000001.class.png").exists());
     fs::remove_dir_all(f.join("out")).unwrap();
 
     // The same ids without saying that they mean nothing: the class list is another's.
@@ -394,6 +400,56 @@ fn labels_without_any_class_leave_geometry_and_colour() {
     fs::write(f.join("list.json"), "{\"1\": {\"name\": 7}}").unwrap();
     let bad = ["list.json", "class 1: name"];
     fail(f, &run_arguments(&["--classes", "list.json"]), 1, &bad);
+}
+
+/// Feature maps change what the map learns; those that do not fit are named, with the frame.
+#[test]
+fn feature_maps_of_another_model_are_used_and_checked() {
+    let folder = recording();
+    let f = folder.path();
+    let maps = f.join("maps");
+    fs::create_dir(&maps).unwrap();
+    let npy = |dtype: &str, channels: usize, scale: f32| -> Vec<u8> {
+        let header = format!(
+            "{{'descr': '{dtype}', 'fortran_order': False, 'shape': ({channels}, 3, 4), }}"
+        );
+        let header = format!("{header:<117}\n");
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend((header.len() as u16).to_le_bytes());
+        bytes.extend(header.bytes());
+        let value = |i: usize| scale * (i as f32 * 0.7).sin();
+        bytes.extend((0..channels * 12).flat_map(|i| value(i).to_le_bytes()));
+        bytes
+    };
+    for i in 0..6 {
+        fs::write(maps.join(format!("{i:06}.npy")), npy("<f4", 7, 1.0 + i as f32)).unwrap();
+    }
+    let run = |extra: &[&str]| {
+        let mut all = vec!["--json", "--set", "fusion.final_weight=1"];
+        all.extend(["--set", "mapping.semantic_iterations=8"]);
+        all.extend(extra);
+        let mut arguments = run_arguments(&[]);
+        arguments.extend(all);
+        let json = json_of(f, &arguments);
+        succeed(f, &["render", "out", "--frame", "0", "--engine", "cpu"]);
+        fs::remove_dir_all(f.join("out")).unwrap();
+        json["semantics"]["miou_percent"].as_f64().unwrap()
+    };
+    let (with, without) = (run(&["--features", "maps"]), run(&[]));
+    assert_ne!(with, without);
+    for (file, bytes, parts) in [
+        ("000002.npy", npy("<f4", 6, 1.0), ["(frame 2)", "found 6, expected 7"]),
+        ("000001.npy", npy("<f8", 7, 1.0), ["(frame 1)", "found <f8"]),
+    ] {
+        let good = fs::read(maps.join(file)).unwrap();
+        fs::write(maps.join(file), bytes).unwrap();
+        fail(f, &run_arguments(&["--features", "maps"]), 1, &[file, parts[0], parts[1]]);
+        fs::write(maps.join(file), good).unwrap();
+    }
+    fs::remove_file(maps.join("000003.npy")).unwrap();
+    let missing = ["000003.npy", "no such file", "frame 3"];
+    fail(f, &run_arguments(&["--features", "maps"]), 1, &missing);
+    fail(f, &run_arguments(&["--features", "nowhere"]), 1, &["nowhere"]);
 }
 
 #[test]
@@ -421,6 +477,7 @@ fn an_ablation_compares_rows_over_seeds_and_resumes() {
     fail(f, &arguments(&["--truth-labels", "none"]), 2, &none);
     fail(f, &arguments(&["--seed", "3"]), 2, &["--seed 3", "--seeds N"]);
     fail(f, &arguments(&["--set", "fusion.enabled=false"]), 2, &["`fusion.enabled`"]);
+    fail(f, &arguments(&["--rows", "frs,frs"]), 2, &["--rows", "twice"]);
     write_labels(f, "blank", |_, _, _| 9999);
     let blank = ["--labels", "blank", "--unlabelled", "9999"];
     fail(f, &arguments(&blank), 1, &["ablate needs labels", "no pixel with a class"]);
@@ -491,7 +548,6 @@ fn an_ablation_compares_rows_over_seeds_and_resumes() {
     let fewer: Value = serde_json::from_slice(&fewer.stdout).unwrap();
     assert_eq!(fewer["rows"].as_array().unwrap().len(), 2);
     assert_eq!(fewer["rows"][0]["figures"], rows[2]["figures"]);
-    fail(f, &arguments(&["--rows", "frs,frs"]), 2, &["--rows", "twice"]);
 
     // Started again, it computes what is missing and nothing else.
     let before = kept;

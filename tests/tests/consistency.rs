@@ -253,6 +253,23 @@ fn anchors_and_fused_features_are_seen() {
     }
 }
 
+/// Points' classes are the head's or their nearest anchors', as asked for; free anchors have none.
+#[test]
+fn points_take_the_class_of_their_nearest_anchor() {
+    let cases = cases("query_points");
+    let classes = |i: usize| -> Vec<u32> {
+        let after = run(&mut Engine::cpu(), &cases[i], &cases[i].buffers);
+        after[6].chunks_exact(8).map(|v| v[1]).collect()
+    };
+    let (by_head, by_anchor) = (classes(1), classes(3));
+    assert!(by_anchor.iter().all(|c| *c < CLASSES), "{by_anchor:?}");
+    assert_ne!(by_head, by_anchor);
+    let mut found = by_anchor.clone();
+    found.sort_unstable();
+    found.dedup();
+    assert!(found.len() > 1, "{found:?}");
+}
+
 /// Products are what their definition says, not only what both sides make of it.
 #[test]
 fn products_follow_their_definition() {

@@ -109,6 +109,7 @@ pub fn run(args: &AblateArgs, screen: Screen) -> Result<()> {
         scale: record.scale,
         labels: record.labels.clone(),
         truth_labels: record.truth_labels.clone(),
+        features: record.features.clone(),
         classes: record.classes.clone(),
         unlabelled: record.unlabelled,
         render_every: args.render_every,

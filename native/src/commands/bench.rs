@@ -198,6 +198,7 @@ fn box_frame(pose: &Pose) -> Frame {
     let half = SIZE_M * 0.45;
     let pixels = (0..CAMERA.height).flat_map(|v| (0..CAMERA.width).map(move |u| (u, v)));
     let mut frame = Frame {
+        features: None,
         index: 0,
         number: 0,
         time_s: 0.0,

@@ -31,6 +31,8 @@ pub struct RunKey {
     pub labels: String,
     /// Labels that classes are scored against.
     pub truth_labels: String,
+    /// Folder of feature maps.
+    pub features: Option<String>,
     /// Class list asked for.
     pub classes: Option<String>,
     /// Id asked to mean "no label".
