@@ -463,7 +463,9 @@ fn an_ablation_compares_rows_over_seeds_and_resumes() {
         let mut all = vec!["ablate", "room", "--out", "out", "--seeds", "2"];
         let tiny = TINY.iter().position(|a| *a == "--mesh-resolution").unwrap();
         all.extend(&TINY[..tiny]);
-        all.extend(["--set", "mapping.semantic_iterations=8", "--set", "mapping.rays=300"]);
+        all.extend(["--set", "mapping.semantic_iterations=8", "--set", "mapping.rays=200"]);
+        // Few samples: the row with a perceptron on each of them takes most of the time.
+        all.extend(["--set", "sampling.stratified=8"]);
         // So strong that a few iterations show which module is on.
         all.extend(["--set", "fusion.first_steps=8", "--set", "fusion.final_weight=1"]);
         all.extend(["--set", "suppressor.final_weight=1"]);
@@ -529,9 +531,11 @@ fn an_ablation_compares_rows_over_seeds_and_resumes() {
     assert!((70.0..90.0).contains(&accuracy), "{accuracy}");
     let markdown = read(out.join("ablation.md"));
     let lines = ["| row ", "| input labels ", "| neither ", "| both, no local module "];
-    for line in lines.iter().chain(&["| per-sample head ", "IoU of the thin and small classes"]) {
+    for line in lines.iter().chain(&["| MTFF ", "| FRS ", "| both ", "| per-sample head "]) {
         assert!(markdown.contains(line), "{markdown}");
     }
+    let small = rows[0]["runs"][0]["small_class_names"].as_array().unwrap();
+    assert_eq!(markdown.contains("IoU of the thin and small classes"), !small.is_empty());
 
     // A run is what `run` gives with the same settings.
     let mut plain = vec!["run", "room", "--out", "plain", "--labels", "noisy", "--no-mesh"];

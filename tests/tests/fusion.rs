@@ -175,9 +175,9 @@ fn check(
 }
 
 /// Every layer of the fusion and the class head it shares with the field.
-fn fusion_gradients(fusion: FusionConfig, channels: u32) {
+fn fusion_gradients(fusion: FusionConfig) {
     let local = fusion.local;
-    let mut d = device_with(Engine::cpu(), fusion, channels);
+    let mut d = device(Engine::cpu(), fusion);
     fusion_loss(&mut d);
     let f = d.fusion.as_ref().unwrap();
     let (tensor, layers) = (f.parameters, f.layers.clone());
@@ -208,12 +208,19 @@ fn fusion_gradients(fusion: FusionConfig, channels: u32) {
 
 #[test]
 fn gradients_of_the_fusion() {
-    fusion_gradients(FusionConfig::default(), 0);
+    fusion_gradients(FusionConfig::default());
 }
 
 #[test]
-fn gradients_of_the_fusion_of_feature_maps() {
-    fusion_gradients(FusionConfig::default(), 11);
+fn gradients_of_the_projection_of_feature_maps() {
+    let mut d = device_with(Engine::cpu(), FusionConfig::default(), 11);
+    fusion_loss(&mut d);
+    let f = d.fusion.as_ref().unwrap();
+    let tensor = f.parameters;
+    let layer = *f.layers.iter().find(|l| l.name == "feature projection").unwrap();
+    let gradient = read(&mut d, tensor.gradient, tensor.floats);
+    let weights = layer.weights as usize..(layer.weights + layer.weight_count()) as usize;
+    check(&mut d, tensor.values, &gradient, weights, layer.name, &mut fusion_loss);
 }
 
 /// The fusion reads the map of the frame's own slot, on the token grid, in place of the labels.
@@ -258,18 +265,22 @@ fn feature_maps_take_the_place_of_labels() {
 
 #[test]
 fn gradients_of_the_widest_fusion() {
-    fusion_gradients(
-        FusionConfig { key_stride: 1, local_kernel: 3, gate_kernel: 3, ..FusionConfig::default() },
-        0,
-    );
+    fusion_gradients(FusionConfig {
+        key_stride: 1,
+        local_kernel: 3,
+        gate_kernel: 3,
+        ..FusionConfig::default()
+    });
 }
 
 #[test]
 fn gradients_of_the_plainest_fusion() {
-    fusion_gradients(
-        FusionConfig { key_stride: 3, residual: false, local: false, ..FusionConfig::default() },
-        0,
-    );
+    fusion_gradients(FusionConfig {
+        key_stride: 3,
+        residual: false,
+        local: false,
+        ..FusionConfig::default()
+    });
 }
 
 const NO_LOSS: LossConfig = LossConfig {

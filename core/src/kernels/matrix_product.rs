@@ -144,30 +144,20 @@ fn pack(from: &[f32], inner: usize, outer: usize, width: usize, tile: &mut [[f32
     }
 }
 
-/// sums += a^T b, in blocks of 4 rows and 8 columns that stay in registers.
+/// sums += a^T b, four inner indices at once: along a row of sums compilers vectorise it, and each
+/// sum is loaded and stored once for four products.
 fn multiply(a: &[[f32; TILE]], b: &[[f32; TILE]], height: usize, sums: &mut [[f32; TILE]]) {
-    const ROWS: usize = 4;
-    const COLUMNS: usize = 8;
-    for i in (0..height).step_by(ROWS) {
-        for j in (0..TILE).step_by(COLUMNS) {
-            let mut block = [[0.0_f32; COLUMNS]; ROWS];
-            for (r, row) in block.iter_mut().enumerate() {
-                row.copy_from_slice(&sums[i + r][j..j + COLUMNS]);
+    let (quads, rest) = b.as_chunks::<4>();
+    for (i, sums) in sums.iter_mut().enumerate().take(height) {
+        for (a, [b0, b1, b2, b3]) in a.as_chunks::<4>().0.iter().zip(quads) {
+            let x = [a[0][i], a[1][i], a[2][i], a[3][i]];
+            for c in 0..TILE {
+                sums[c] = sums[c] + x[0] * b0[c] + x[1] * b1[c] + x[2] * b2[c] + x[3] * b3[c];
             }
-            for (a, b) in a.iter().zip(b) {
-                let mut x = [0.0_f32; ROWS];
-                x.copy_from_slice(&a[i..i + ROWS]);
-                let mut y = [0.0_f32; COLUMNS];
-                y.copy_from_slice(&b[j..j + COLUMNS]);
-                for r in 0..ROWS {
-                    for c in 0..COLUMNS {
-                        block[r][c] += x[r] * y[c];
-                    }
-                }
-            }
-            for (r, row) in block.iter().enumerate() {
-                sums[i + r][j..j + COLUMNS].copy_from_slice(row);
-            }
+        }
+        for (a, b) in a[a.len() - rest.len()..].iter().zip(rest) {
+            let x = a[i];
+            sums.iter_mut().zip(b).for_each(|(s, b)| *s += x * b);
         }
     }
 }
