@@ -8,8 +8,10 @@
 @group(0) @binding(3) var<storage, read> planes_appearance: array<vec4f>;
 @group(0) @binding(4) var<storage, read> planes_semantic: array<vec4f>;
 @group(0) @binding(5) var<storage, read> decoders: array<vec4f>;
+// Per anchor: vector (4) | class (bits, 255: free), ... | ...
+@group(0) @binding(6) var<storage, read> anchors: array<vec4f>;
 // Distance [truncations]; for params.flags & FLAG_MAP then 2 vec4 a point: distance, class (bits), 0, 0 | rgb, 0.
-@group(0) @binding(6) var<storage, read_write> values: array<f32>;
+@group(0) @binding(7) var<storage, read_write> values: array<f32>;
 
 #import shared/geometry.wgsl
 #import shared/appearance.wgsl
@@ -40,6 +42,22 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
             if (logit > best) {
                 best = logit;
                 best_class = c;
+            }
+        }
+        if ((params.flags & FLAG_ANCHORS) != 0u) {
+            var nearest = 1e30;
+            for (var a = 0u; a < params.anchors; a++) {
+                let at = a * ${ANCHOR_VEC4}u;
+                let class_id = bitcast<u32>(anchors[at + 4u].x);
+                var d = 0.0;
+#for j in 0..4
+                let e${j} = feature[${j}] - anchors[at + ${j}u];
+                d += dot(e${j}, e${j});
+#end
+                if (class_id != 255u && d < nearest) {
+                    nearest = d;
+                    best_class = class_id;
+                }
             }
         }
     }

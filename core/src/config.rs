@@ -45,6 +45,8 @@ pub struct Config {
     pub mapping: MappingConfig,
     /// Keyframes.
     pub keyframes: KeyframeConfig,
+    /// Semantics.
+    pub semantics: SemanticsConfig,
     /// Multi-tier feature fusion.
     pub fusion: FusionConfig,
     /// Feature redundancy suppressor.
@@ -296,6 +298,26 @@ pub struct SuppressorConfig {
     pub inference: Inference,
 }
 
+/// Where a pixel's class comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Head {
+    /// Features are composited and decoded once a ray.
+    Ray,
+    /// A perceptron 32-256-256-256-C runs on every sample, and its logits are composited (SNI-SLAM):
+    /// a baseline to compare with. Fusion and suppressor work on features of rays; with it they
+    /// are off.
+    Sample,
+}
+
+/// Semantics.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SemanticsConfig {
+    /// What turns semantic features into classes.
+    pub head: Head,
+}
+
 /// Meshing.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -316,6 +338,7 @@ impl Default for Config {
             tracking: TrackingConfig::default(),
             mapping: MappingConfig::default(),
             keyframes: KeyframeConfig::default(),
+            semantics: SemanticsConfig::default(),
             fusion: FusionConfig::default(),
             suppressor: SuppressorConfig::default(),
             mesh: MeshConfig::default(),
@@ -416,6 +439,12 @@ impl Default for MappingConfig {
 impl Default for KeyframeConfig {
     fn default() -> Self {
         KeyframeConfig { every: 5, budget_mib: 96 }
+    }
+}
+
+impl Default for SemanticsConfig {
+    fn default() -> Self {
+        SemanticsConfig { head: Head::Ray }
     }
 }
 

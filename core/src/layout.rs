@@ -214,9 +214,7 @@ params! {
         doubt_anchor: f32,
         /// How fast trust in a label falls with its logit at the pixel's fused feature.
         doubt_fused: f32,
-        /// Unused.
-        spare0: u32,
-        /// Unused.
-        spare1: u32,
+        /// Samples of a ray that the per-sample head sees: all, or in views the first few that carry weight.
+        slots: u32,
     }
 }

@@ -111,8 +111,9 @@ pub enum Command {
     /// Measure what feature fusion and redundancy suppressor bring: neither, each, both, over seeds
     #[command(
         long_about = "Run SLAM on a labelled recording with neither of the two semantic modules, \
-        with multi-tier feature fusion (MTFF), with the feature redundancy suppressor (FRS) and \
-        with both, each over several seeds, and compare the classes rendered at estimated poses, \
+        with multi-tier feature fusion (MTFF), with the feature redundancy suppressor (FRS), with \
+        both, with both but without the fusion's local module, and with SNI-SLAM's perceptron on \
+        every sample in place of all that, each over several seeds, and compare the classes rendered at estimated poses, \
         without depth input, with the true labels. It matters most where the labels that the map \
         learns from are imperfect (--labels): true labels leave the modules little to do.\n\n\
         The output folder receives:\n    \
@@ -120,7 +121,7 @@ pub enum Command {
         ablation.json   the same with every seed's figures and the IoU of every class\n    \
         runs/           a file a finished run; a second start takes up where the first one ended\n\n\
         Examples:\n    \
-        mte-slam ablate data/room0 --labels segmented\n    \
+        mte-slam ablate data/room0 --labels segmented --rows neither,both\n    \
         mte-slam ablate data/room0 --labels segmented --seeds 3 --preset fast --frames 100 --out out/try"
     )]
     Ablate(AblateArgs),
@@ -269,6 +270,11 @@ pub struct SelectionArgs {
     /// of --labels].
     #[arg(long, value_name = "dataset|DIR|none", help_heading = "Recording")]
     pub truth_labels: Option<String>,
+    /// Folder of feature maps made of the colour images by any model, such as DINOv2: 000000.npy, ...
+    /// by frame number, float32 or float16, channels x height x width. The feature fusion reads
+    /// them in place of the labels (which it is still trained by).
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath, help_heading = "Recording")]
+    pub features: Option<PathBuf>,
     /// What the labels and the truth are read with.
     #[command(flatten)]
     pub classes: ClassArgs,
@@ -429,15 +435,54 @@ pub struct ServeArgs {
     pub selection: SelectionArgs,
 }
 
+/// A row of the ablation's table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum AblationRow {
+    /// Neither module.
+    Neither,
+    /// Feature fusion alone.
+    Mtff,
+    /// Redundancy suppressor alone.
+    Frs,
+    /// Both modules.
+    Both,
+    /// Both, but the fusion without its local module.
+    NoLocal,
+    /// Neither, and a perceptron 32-256-256-256-C on every sample instead of a head once a ray:
+    /// about a hundred times the work.
+    SampleHead,
+}
+
+impl AblationRow {
+    /// All of them, as the table shows them.
+    pub const ALL: [AblationRow; 6] = [
+        AblationRow::Neither,
+        AblationRow::Mtff,
+        AblationRow::Frs,
+        AblationRow::Both,
+        AblationRow::NoLocal,
+        AblationRow::SampleHead,
+    ];
+}
+
 /// `ablate`.
 #[derive(Debug, Args)]
 pub struct AblateArgs {
     /// Folder of the recording.
     #[arg(value_name = "DATASET", value_hint = ValueHint::DirPath)]
     pub dataset: PathBuf,
-    /// Seeds 1 to N for each of the four rows.
+    /// Seeds 1 to N for each of the rows.
     #[arg(long, value_name = "N", default_value = "5", value_parser = at_least_one)]
     pub seeds: usize,
+    /// Rows of the table, in this order.
+    #[arg(
+        long,
+        value_enum,
+        value_name = "ROWS",
+        value_delimiter = ',',
+        default_values_t = AblationRow::ALL
+    )]
+    pub rows: Vec<AblationRow>,
     /// Output folder: empty, absent, or of an ablation that is to be continued [default:
     /// out/DATASET-PRESET-ablation].
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
@@ -448,7 +493,7 @@ pub struct AblateArgs {
     /// Which part of the recording, and how it is read.
     #[command(flatten)]
     pub selection: SelectionArgs,
-    /// Configuration of all rows; the two modules and the seed are set by the ablation.
+    /// Configuration of all rows; modules, class head and seed are set by the ablation.
     #[command(flatten)]
     pub config: ConfigArgs,
     /// Engine.

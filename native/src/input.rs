@@ -66,6 +66,7 @@ pub fn prepare(
         scale: selection.scale,
         labels: selection.labels.clone(),
         truth_labels: class_truth.name.clone(),
+        features: selection.features.as_ref().map(|f| f.display().to_string()),
         classes: selection.classes.classes.clone(),
         unlabelled: selection.classes.unlabelled,
         ..RunRecord::default()
@@ -99,7 +100,13 @@ pub fn open(path: &Path, selection: &SelectionArgs, screen: Screen) -> Result<Bo
             "note: {name}: {n} links that lead out of it, such as {first}, are skipped"
         ));
     }
-    open_source(path, source, layout, &selection.labels, selection)
+    let features = selection.features.as_deref();
+    let sequence = open_source(path, source, layout, &selection.labels, features, selection)?;
+    if let Some(folder) = features.filter(|_| sequence.info().classes.is_empty()) {
+        let name = folder.display();
+        screen.note(&format!("note: {name}: feature maps do nothing without labels to learn from"));
+    }
+    Ok(sequence)
 }
 
 fn open_source(
@@ -107,6 +114,7 @@ fn open_source(
     source: FolderSource,
     layout: Option<Layout>,
     labels: &str,
+    features: Option<&Path>,
     selection: &SelectionArgs,
 ) -> Result<Box<dyn Sequence>> {
     let labels = match labels {
@@ -121,6 +129,10 @@ fn open_source(
         frames: selection.frames,
         scale: selection.scale,
         labels,
+        features: match features {
+            Some(folder) => Some(Box::new(FolderSource::open(folder)?)),
+            None => None,
+        },
         classes: selection.classes.classes.as_deref().map(class_list).transpose()?,
         unlabelled_raw_id: selection.classes.unlabelled,
         ..OpenOptions::default()
@@ -164,7 +176,7 @@ pub fn open_truth(
         return Ok(ClassTruth::of_input(wanted, input));
     }
     let layout = selection.layout.as_deref().map(layout_named).transpose()?;
-    let truth = open_source(path, FolderSource::open(path)?, layout, wanted, selection)?;
+    let truth = open_source(path, FolderSource::open(path)?, layout, wanted, None, selection)?;
     if truth.info().classes.is_empty() {
         if chosen.is_some() {
             usage!("--truth-labels {wanted}: found no label images in the recording");

@@ -23,7 +23,7 @@ use crate::{
 use anyhow::{Context, Result};
 use glam::DVec3;
 use mte_slam_core::{
-    classes::{ClassTable, UNLABELLED},
+    classes::ClassTable,
     frame::{Frame, SequenceInfo},
     mesh::Mesh,
     pose::Pose,
@@ -87,10 +87,10 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
     let mut progress = screen.progress("tracking and mapping", info.frames);
     let processed = process(&mut slam, sequence.as_mut(), &record.dataset, &mut progress)?;
     progress.finish();
-    let Processed { timings, labelled, .. } = processed;
+    let (timings, labelled) = (processed.timings, slam.labelled());
     record.colour_scale = slam.colour_registration().scale;
     // Without a single label the map's classes mean nothing: none are shown.
-    let of_map = if labelled { info.classes.clone() } else { ClassTable::default() };
+    let of_map = shown_classes(&slam);
     let estimates = slam.trajectory();
     let truth: Vec<_> = estimates.iter().map(|e| sequence.truth(e.frame)).collect();
 
@@ -176,12 +176,15 @@ pub fn restore(out: &Path, engine: &EngineArgs, screen: Screen) -> Result<Slam> 
     Ok(slam)
 }
 
+/// The classes that pictures and meshes of a map show: none where it has not seen a single label.
+pub fn shown_classes(slam: &Slam) -> ClassTable {
+    if slam.labelled() { slam.info().classes.clone() } else { ClassTable::default() }
+}
+
 /// What [`process`] tells.
 pub struct Processed {
     /// What each frame cost.
     pub timings: Vec<Timing>,
-    /// Whether any pixel of any frame had a class.
-    pub labelled: bool,
     /// Time of the last optimisation, over all keyframes \[s\].
     pub finish_s: f64,
 }
@@ -194,12 +197,9 @@ pub fn process(
     progress: &mut Progress,
 ) -> Result<Processed> {
     let frames = sequence.info().frames;
-    let mut labelled = false;
     let mut timings = Vec::with_capacity(frames);
     for index in 0..frames {
         let frame = sequence.frame(index).with_context(|| recording.to_owned())?;
-        let labels = frame.labels.as_deref().unwrap_or_default();
-        labelled = labelled || labels.iter().any(|l| *l != UNLABELLED);
         let begin = Instant::now();
         let report = block_on(slam.process(&frame))
             .with_context(|| format!("frame {} (index {index})", frame.number))?;
@@ -219,7 +219,7 @@ pub fn process(
     }
     let begin = Instant::now();
     block_on(slam.finish()).context("the last optimisation failed")?;
-    Ok(Processed { timings, labelled, finish_s: begin.elapsed().as_secs_f64() })
+    Ok(Processed { timings, finish_s: begin.elapsed().as_secs_f64() })
 }
 
 fn live_message(slam: &Slam, sequence: &dyn Sequence, report: &FrameReport) -> String {

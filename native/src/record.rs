@@ -31,6 +31,9 @@ pub struct RunRecord {
     pub labels: String,
     /// Labels that classes were scored against: `none`, `dataset` or a folder.
     pub truth_labels: String,
+    /// Folder of feature maps, if any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub features: Option<String>,
     /// The class list asked for, if any: `nyu40`, `replica` or a file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub classes: Option<String>,
@@ -63,6 +66,7 @@ impl Default for RunRecord {
             scale: 1.0,
             labels: "dataset".to_owned(),
             truth_labels: "dataset".to_owned(),
+            features: None,
             classes: None,
             unlabelled: None,
             colour_scale: 1.0,

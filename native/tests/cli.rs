@@ -382,6 +382,12 @@ fn labels_without_any_class_leave_geometry_and_colour() {
     assert!(json["depth"]["l1_cm"].as_f64().unwrap().is_finite());
     assert!(f.join("out/mesh.ply").is_file() && !f.join("out/mesh_semantic.ply").exists());
     assert!(!f.join("out/renders/000000.class.png").exists());
+    // Nor do mesh and views of its checkpoint show classes.
+    succeed(f, &["mesh", "out", "--resolution", "0.1", "--engine", "cpu"]);
+    assert!(!f.join("out/mesh_semantic.ply").exists());
+    succeed(f, &["render", "out", "--frame", "1", "--engine", "cpu"]);
+    assert!(f.join("out/renders/000001.color.png").is_file());
+    assert!(!f.join("out/renders/000001.class.png").exists());
     fs::remove_dir_all(f.join("out")).unwrap();
 
     // The same ids without saying that they mean nothing: the class list is another's.
@@ -396,6 +402,56 @@ fn labels_without_any_class_leave_geometry_and_colour() {
     fail(f, &run_arguments(&["--classes", "list.json"]), 1, &bad);
 }
 
+/// Feature maps change what the map learns; those that do not fit are named, with the frame.
+#[test]
+fn feature_maps_of_another_model_are_used_and_checked() {
+    let folder = recording();
+    let f = folder.path();
+    let maps = f.join("maps");
+    fs::create_dir(&maps).unwrap();
+    let npy = |dtype: &str, channels: usize, scale: f32| -> Vec<u8> {
+        let header = format!(
+            "{{'descr': '{dtype}', 'fortran_order': False, 'shape': ({channels}, 3, 4), }}"
+        );
+        let header = format!("{header:<117}\n");
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend((header.len() as u16).to_le_bytes());
+        bytes.extend(header.bytes());
+        let value = |i: usize| scale * (i as f32 * 0.7).sin();
+        bytes.extend((0..channels * 12).flat_map(|i| value(i).to_le_bytes()));
+        bytes
+    };
+    for i in 0..6 {
+        fs::write(maps.join(format!("{i:06}.npy")), npy("<f4", 7, 1.0 + i as f32)).unwrap();
+    }
+    let run = |extra: &[&str]| {
+        let mut all = vec!["--json", "--set", "fusion.final_weight=1"];
+        all.extend(["--set", "mapping.semantic_iterations=8"]);
+        all.extend(extra);
+        let mut arguments = run_arguments(&[]);
+        arguments.extend(all);
+        let json = json_of(f, &arguments);
+        succeed(f, &["render", "out", "--frame", "0", "--engine", "cpu"]);
+        fs::remove_dir_all(f.join("out")).unwrap();
+        json["semantics"]["miou_percent"].as_f64().unwrap()
+    };
+    let (with, without) = (run(&["--features", "maps"]), run(&[]));
+    assert_ne!(with, without);
+    for (file, bytes, parts) in [
+        ("000002.npy", npy("<f4", 6, 1.0), ["(frame 2)", "found 6, expected 7"]),
+        ("000001.npy", npy("<f8", 7, 1.0), ["(frame 1)", "found <f8"]),
+    ] {
+        let good = fs::read(maps.join(file)).unwrap();
+        fs::write(maps.join(file), bytes).unwrap();
+        fail(f, &run_arguments(&["--features", "maps"]), 1, &[file, parts[0], parts[1]]);
+        fs::write(maps.join(file), good).unwrap();
+    }
+    fs::remove_file(maps.join("000003.npy")).unwrap();
+    let missing = ["000003.npy", "no such file", "frame 3"];
+    fail(f, &run_arguments(&["--features", "maps"]), 1, &missing);
+    fail(f, &run_arguments(&["--features", "nowhere"]), 1, &["nowhere"]);
+}
+
 #[test]
 fn an_ablation_compares_rows_over_seeds_and_resumes() {
     let folder = recording();
@@ -407,7 +463,9 @@ fn an_ablation_compares_rows_over_seeds_and_resumes() {
         let mut all = vec!["ablate", "room", "--out", "out", "--seeds", "2"];
         let tiny = TINY.iter().position(|a| *a == "--mesh-resolution").unwrap();
         all.extend(&TINY[..tiny]);
-        all.extend(["--set", "mapping.semantic_iterations=8", "--set", "mapping.rays=300"]);
+        all.extend(["--set", "mapping.semantic_iterations=8", "--set", "mapping.rays=200"]);
+        // Few samples: the row with a perceptron on each of them takes most of the time.
+        all.extend(["--set", "sampling.stratified=8"]);
         // So strong that a few iterations show which module is on.
         all.extend(["--set", "fusion.first_steps=8", "--set", "fusion.final_weight=1"]);
         all.extend(["--set", "suppressor.final_weight=1"]);
@@ -421,6 +479,7 @@ fn an_ablation_compares_rows_over_seeds_and_resumes() {
     fail(f, &arguments(&["--truth-labels", "none"]), 2, &none);
     fail(f, &arguments(&["--seed", "3"]), 2, &["--seed 3", "--seeds N"]);
     fail(f, &arguments(&["--set", "fusion.enabled=false"]), 2, &["`fusion.enabled`"]);
+    fail(f, &arguments(&["--rows", "frs,frs"]), 2, &["--rows", "twice"]);
     write_labels(f, "blank", |_, _, _| 9999);
     let blank = ["--labels", "blank", "--unlabelled", "9999"];
     fail(f, &arguments(&blank), 1, &["ablate needs labels", "no pixel with a class"]);
@@ -428,16 +487,17 @@ fn an_ablation_compares_rows_over_seeds_and_resumes() {
     let noisy = ["--labels", "noisy", "--json"];
     let first = succeed(f, &arguments(&noisy));
     let progress = text(&first.stderr);
-    assert!(progress.contains("run 8/8 (both, seed 2)"), "{progress}");
+    assert!(progress.contains("run 12/12 (per-sample head, seed 2)"), "{progress}");
     let json: Value = serde_json::from_slice(&first.stdout).unwrap();
     let out = f.join("out");
     assert_eq!(names(&out), ["ablation.json", "ablation.md", "runs"]);
-    assert_eq!(names(&out.join("runs")).len(), 8);
+    assert_eq!(names(&out.join("runs")).len(), 12);
     assert_eq!(read(out.join("ablation.json")), text(&first.stdout));
     let number = |v: &Value| v.as_f64().unwrap_or_else(|| panic!("{v} is no number"));
     let rows = json["rows"].as_array().unwrap();
     let row_names: Vec<&str> = rows.iter().map(|r| r["name"].as_str().unwrap()).collect();
-    assert_eq!(row_names, ["neither", "MTFF", "FRS", "both"]);
+    let all = ["neither", "MTFF", "FRS", "both", "both, no local module", "per-sample head"];
+    assert_eq!(row_names, all);
     for row in rows {
         let runs = row["runs"].as_array().unwrap();
         let miou: Vec<f64> = runs.iter().map(|r| number(&r["classes"]["miou_percent"])).collect();
@@ -453,19 +513,29 @@ fn an_ablation_compares_rows_over_seeds_and_resumes() {
         assert_eq!(p["anchors"].as_u64() > Some(0), row["suppressor"] == true, "{p}");
         assert_eq!(p["anchors_in_use"].as_u64() > Some(0), row["suppressor"] == true, "{p}");
         let classes = json["sequence"]["classes"].as_u64().unwrap();
-        assert_eq!(p["class_head"].as_u64(), Some(17 * classes));
-        assert_eq!(p["semantic_decoder"].as_u64(), Some(32 * 32 + 32 + 32 * 16 + 16));
+        let per_sample = row["head"] == "sample";
+        let head = if per_sample { 33 * 256 + 2 * 257 * 256 + 257 * classes } else { 17 * classes };
+        assert_eq!(p["class_head"].as_u64(), Some(head));
+        let decoder = if per_sample { 0 } else { 32 * 32 + 32 + 32 * 16 + 16 };
+        assert_eq!(p["semantic_decoder"].as_u64(), Some(decoder));
     }
     let at = |row: usize| number(&rows[row]["figures"]["miou_percent"]["mean"]);
     assert!(at(0) != at(1) && at(0) != at(2) && at(1) != at(3), "every row is another");
+    assert!(at(3) != at(4) && at(0) != at(5), "every row is another");
+    let fusion = |row: usize| rows[row]["parameters"]["fusion"].as_u64().unwrap();
+    // The depthwise convolution: 3 x 3 and a bias for each of 16 channels.
+    assert_eq!(fusion(3) - fusion(4), 10 * 16);
     let gain = number(&rows[3]["figures"]["miou_gain_over_neither_points"]["mean"]);
     assert!((gain - (at(3) - at(0))).abs() < 1e-9);
     let accuracy = number(&json["input_labels"]["pixel_accuracy_percent"]);
     assert!((70.0..90.0).contains(&accuracy), "{accuracy}");
     let markdown = read(out.join("ablation.md"));
-    for line in ["| row ", "| input labels ", "| neither ", "| MTFF ", "| FRS ", "| both "] {
+    let lines = ["| row ", "| input labels ", "| neither ", "| both, no local module "];
+    for line in lines.iter().chain(&["| MTFF ", "| FRS ", "| both ", "| per-sample head "]) {
         assert!(markdown.contains(line), "{markdown}");
     }
+    let small = rows[0]["runs"][0]["small_class_names"].as_array().unwrap();
+    assert_eq!(markdown.contains("IoU of the thin and small classes"), !small.is_empty());
 
     // A run is what `run` gives with the same settings.
     let mut plain = vec!["run", "room", "--out", "plain", "--labels", "noisy", "--no-mesh"];
@@ -477,12 +547,18 @@ fn an_ablation_compares_rows_over_seeds_and_resumes() {
     assert_eq!(kept["classes"]["miou_percent"], plain["semantics"]["miou_percent"]);
     assert_eq!(kept["ate_rmse_cm"], plain["trajectory"]["aligned_cm"]["rmse"]);
 
+    // Fewer rows: none is computed again, and gains need the first one.
+    let fewer = succeed(f, &arguments(&["--labels", "noisy", "--json", "--rows", "frs,neither"]));
+    let fewer: Value = serde_json::from_slice(&fewer.stdout).unwrap();
+    assert_eq!(fewer["rows"].as_array().unwrap().len(), 2);
+    assert_eq!(fewer["rows"][0]["figures"], rows[2]["figures"]);
+
     // Started again, it computes what is missing and nothing else.
     let before = kept;
     fs::remove_file(out.join("runs/frs-2.json")).unwrap();
     let again = succeed(f, &arguments(&noisy));
     let progress = text(&again.stderr);
-    assert!(progress.contains("8 runs, 7 of them kept"), "{progress}");
+    assert!(progress.contains("12 runs, 11 of them kept"), "{progress}");
     assert!(progress.contains("(FRS, seed 2)") && !progress.contains("(both, seed 2)"));
     let after: Value = serde_json::from_str(&read(out.join("runs/frs-2.json"))).unwrap();
     assert_eq!(before["classes"], after["classes"]);

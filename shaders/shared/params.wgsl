@@ -29,7 +29,9 @@ struct Params {
     // Token grid of the fused features [tokens], edge of a token [pixels], floats of a token's raw inputs.
     token_columns: u32, token_rows: u32, token_size: u32, raw_stride: u32,
     // How fast trust in a label falls: by anchors, by fused features.
-    doubt_anchor: f32, doubt_fused: f32, spare0: u32, spare1: u32,
+    doubt_anchor: f32, doubt_fused: f32,
+    // Samples of a ray that the per-sample head sees.
+    slots: u32,
 }
 @group(0) @binding(0) var<uniform> params: Params;
 

@@ -3,7 +3,7 @@
 use crate::{
     Compare, TestRandom, f32_words,
     fixture::{self, CLASSES, FRAMES, Options, POISON, State, words, workgroups},
-    tokens,
+    samples, tokens,
 };
 use mte_slam_core::{
     engine::Engine,
@@ -255,7 +255,7 @@ pub fn cases(kernel: &str) -> Vec<Case> {
         "pose_step" => pose_steps(&usual),
         "query_points" => query_points(),
         "reduce_partials" => reduce_partials(),
-        _ => tokens::cases(kernel),
+        _ => samples::cases(kernel).unwrap_or_else(|| tokens::cases(kernel)),
     }
 }
 
@@ -461,16 +461,26 @@ fn query_points() -> Vec<Case> {
         state.buffers.insert("values", values);
         let overwritten: &[_] = if flags == 0 { &["values"] } else { &[] };
         let mut c = case(name, &QUERY_POINTS, &state, overwritten);
-        c.tolerance[5] = compare;
+        c.tolerance[6] = compare;
         c
     };
     let line = Compare::Columns { row: 1, bits: &[], relative: SUMS };
     let surface = Compare::Columns { row: 8, bits: &[1], relative: SUMS };
-    vec![
+    let mut cases = vec![
         query("distances", 0, CLASSES, vec![POISON; 150], line),
         query("surface", FLAG_MAP, CLASSES, vec![0; 150 * 8], surface),
         query("surface without classes", FLAG_MAP, 0, vec![0; 150 * 8], surface),
-    ]
+    ];
+    // Anchors at what rays found, so that they are near features; every fourth slot is free.
+    let mut supervised = supervised("", 19, FLAG_DENSE, 0.0, 0.0, [0.0; 2]);
+    state.buffers.insert("anchors", supervised.buffers.swap_remove(5));
+    (state.params.flags, state.params.classes) = (FLAG_MAP | FLAG_ANCHORS, CLASSES);
+    state.params.anchors = 19;
+    state.buffers.insert("values", vec![0; 150 * 8]);
+    let mut anchors = case("classes of anchors", &QUERY_POINTS, &state, &[]);
+    anchors.tolerance[6] = surface;
+    cases.push(anchors);
+    cases
 }
 
 /// Camera-frame points of the first frame (slot 0) with their intensity; some not in the map.

@@ -146,7 +146,16 @@ pub fn frame_of(camera: &Camera, index: u32) -> Frame {
     }
     let number = u64::from(index);
     let labels = Some(labels);
-    Frame { index: index as usize, number, time_s: 0.0, color, depth, labels, truth: Some(pose) }
+    Frame {
+        index: index as usize,
+        number,
+        time_s: 0.0,
+        color,
+        depth,
+        labels,
+        truth: Some(pose),
+        features: None,
+    }
 }
 
 /// Parameters and named buffers of a pass, as words. Names are those of the kernels' bindings.

@@ -5,6 +5,7 @@ pub mod browser;
 pub mod cases;
 pub mod fixture;
 pub mod recorded;
+pub mod samples;
 pub mod tokens;
 
 use bytemuck::Pod;

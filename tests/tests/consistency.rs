@@ -21,6 +21,7 @@ use mte_slam_tests::{
     fixture::{CLASSES, Options, POISON, State, run_words, words},
     gpu_engine, gpu_engine_with,
     recorded::Recorded,
+    samples,
     tokens::maintenance,
 };
 use pollster::block_on;
@@ -67,8 +68,8 @@ macro_rules! consistency {
 consistency! {
     adam align_points attend_keys attend_queries attend_tokens composite composite_backward
     decode_rays extract_tokens gate_backward gate_tokens geometry_backward geometry_forward
-    geometry_weights maintain_anchors mask_rays pose_gradient pose_step query_points
-    recall_tokens reduce_partials sample_depths sample_rays scatter_geometry scatter_surface token_layer
+    geometry_weights maintain_anchors mask_rays matrix_product pose_gradient pose_step query_points
+    recall_tokens reduce_partials sample_depths sample_features sample_logits sample_rays scatter_geometry scatter_surface token_layer
     token_layer_backward token_loss token_weights update_anchors weight_gradient
 }
 
@@ -281,6 +282,57 @@ fn labels_far_from_their_anchors_are_doubted() {
         vouched += u32::from(b.2.abs() > 1.05 * a.2.abs());
     }
     assert!(doubted > 5 && vouched > 5, "{doubted} doubted, {vouched} vouched for");
+}
+
+/// Points' classes are the head's or their nearest anchors', as asked for; free anchors have none.
+#[test]
+fn points_take_the_class_of_their_nearest_anchor() {
+    let cases = cases("query_points");
+    let classes = |i: usize| -> Vec<u32> {
+        let after = run(&mut Engine::cpu(), &cases[i], &cases[i].buffers);
+        after[6].chunks_exact(8).map(|v| v[1]).collect()
+    };
+    let (by_head, by_anchor) = (classes(1), classes(3));
+    assert!(by_anchor.iter().all(|c| *c < CLASSES), "{by_anchor:?}");
+    assert_ne!(by_head, by_anchor);
+    let mut found = by_anchor.clone();
+    found.sort_unstable();
+    found.dedup();
+    assert!(found.len() > 1, "{found:?}");
+}
+
+/// Products are what their definition says, not only what both sides make of it.
+#[test]
+fn products_follow_their_definition() {
+    let mut checked = 0;
+    for case in cases("matrix_product") {
+        let Some(expected) = samples::expected_product(&case) else { continue };
+        let after = run(&mut Engine::cpu(), &case, &case.buffers);
+        for (i, (found, expected)) in after[3].iter().zip(&expected).enumerate() {
+            let found = f64::from(f32::from_bits(*found));
+            assert!((found - expected).abs() < 1e-4, "{} {i}: {found} {expected}", case.name);
+        }
+        checked += 1;
+    }
+    assert_eq!(checked, 5);
+}
+
+/// In views a ray's slots are its intervals that carry weight, front to back, the rest empty.
+#[test]
+fn slots_of_views_are_the_intervals_that_carry_weight() {
+    let case = &cases("sample_features")[1];
+    let after = run(&mut Engine::cpu(), case, &case.buffers);
+    let floats = |words: &[u32]| words.iter().map(|w| f32::from_bits(*w)).collect::<Vec<_>>();
+    let (weights, slots) = (floats(&case.buffers[2]), floats(&after[6]));
+    let (mut full, mut empty) = (0, 0);
+    for (ray, slots) in weights.chunks_exact(16).zip(slots.chunks_exact(5)) {
+        let heavy: Vec<f32> = ray.iter().copied().filter(|w| *w > 1e-3).take(5).collect();
+        assert_eq!(heavy, slots[..heavy.len()]);
+        assert!(slots[heavy.len()..].iter().all(|w| *w == 0.0));
+        full += usize::from(heavy.len() == 5);
+        empty += usize::from(heavy.is_empty());
+    }
+    assert!(full > 3 && empty < 41, "{full} {empty}");
 }
 
 /// The pixel of a ray picks the token whose fused feature it is pulled to: columns across, rows

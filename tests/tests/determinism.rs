@@ -1,7 +1,7 @@
 //! Twenty iterations of mapping, run again, give the same bytes: no sum depends on the order in
 //! which threads or workgroups run. The same of iterations that train the fusion and move anchors.
 use mte_slam_core::{
-    config::{Config, LossConfig},
+    config::{Config, Head, LossConfig},
     device::{Batch, Device, Guidance, Rates},
     engine::Engine,
     kernels::shared::{FLAG_GUIDED, FLAG_MAP, FLAG_POSE},
@@ -18,7 +18,17 @@ const RAYS_PER_FRAME: u32 = 100;
 
 /// All parameters, then poses and their state, after 20 iterations.
 fn map(engine: Engine) -> Vec<Vec<u32>> {
+    map_with(engine, Head::Ray, 20)
+}
+
+/// The same with a class head on every sample, whose parameters come fifth; two iterations.
+fn map_with_samples(engine: Engine) -> Vec<Vec<u32>> {
+    map_with(engine, Head::Sample, 2)
+}
+
+fn map_with(engine: Engine, head: Head, iterations: u32) -> Vec<Vec<u32>> {
     let mut config = Config { field: fixture::field_config(), ..Config::default() };
+    config.semantics.head = head;
     (config.sampling.stratified, config.sampling.surface) = (12, 4);
     (config.mapping.rays, config.tracking.render_rays) = (FRAMES * RAYS_PER_FRAME, 1);
     config.mapping.decoder_stride = 2;
@@ -44,7 +54,7 @@ fn map(engine: Engine) -> Vec<Vec<u32>> {
     d.upload_window(&mut r, &[(2, true), (0, false), (1, false)]);
     d.engine.submit(&r).unwrap();
     let loss = LossConfig::default();
-    for iteration in 0..20 {
+    for iteration in 0..iterations {
         let batch = Batch {
             frames: FRAMES,
             rays_per_frame: RAYS_PER_FRAME,
@@ -65,7 +75,9 @@ fn map(engine: Engine) -> Vec<Vec<u32>> {
     }
     assert_eq!(block_on(d.read_status()).unwrap(), 0, "saturated or not finite");
     let mut out = Vec::new();
-    for t in [d.geometry, d.appearance, d.semantic, d.decoders] {
+    let mut tensors = vec![d.geometry, d.appearance, d.semantic, d.decoders];
+    tensors.extend(d.sample_head.as_ref().map(|h| h.parameters));
+    for t in tensors {
         for buffer in [t.values, t.moment1, t.moment2] {
             out.push(block_on(d.engine.read(buffer, 0, t.floats)).unwrap());
         }
@@ -123,6 +135,15 @@ fn the_gpu_repeats_itself() {
         println!("tensor {tensor}: {:.1e}", (error / size).sqrt());
         assert!(error < 1e-4 * size, "tensor {tensor}: {error} of {size}");
     }
+}
+
+#[test]
+fn a_head_on_every_sample_repeats_itself() {
+    let first = with_threads(1, map_with_samples);
+    assert!(with_threads(3, map_with_samples) == first);
+    assert!([7, 13].iter().all(|moments| first[*moments].iter().any(|word| *word != 0)));
+    let gpu: Vec<_> = (0..2).filter_map(|_| gpu_engine()).map(map_with_samples).collect();
+    assert!(gpu.windows(2).all(|pair| pair[0] == pair[1]));
 }
 
 /// Fused features, anchors and what they train, after eight iterations: semantic planes, decoders,

@@ -5,10 +5,10 @@ use mte_slam_core::{
     config::{Config, FusionConfig, LossConfig},
     device::{Batch, Device, Guidance, Rates},
     engine::Engine,
-    frame::Frame,
+    frame::{FeatureMap, Frame},
     kernels::{
         shared::{FLAG_GUIDED, FLAG_MAP},
-        tokens::{APPEARANCE_AT, COLOR_AT, NO_BIAS},
+        tokens::{APPEARANCE_AT, COLOR_AT, NO_BIAS, SEMANTIC_AT},
     },
     layout::{ANCHOR_FLOATS, GEOMETRY_FLOATS, HEAD_FLOATS, RAY_STATE_FLOATS, STATE_ANCHOR},
     recording::{BufferId, Recording},
@@ -38,9 +38,15 @@ fn config(fusion: FusionConfig) -> Config {
 /// A device with frames, random planes and decoders, and parameters of the fusion none of which is
 /// 0: biases start there, and attention starts close to a mean.
 fn device(engine: Engine, fusion: FusionConfig) -> Device {
+    device_with(engine, fusion, 0)
+}
+
+/// The same with feature maps of so many channels.
+fn device_with(engine: Engine, fusion: FusionConfig, channels: u32) -> Device {
     let camera = fixture::wide_camera();
+    let (config, shape) = (config(fusion), fixture::shape());
     let mut d =
-        Device::new(engine, &config(fusion), camera, DEPTH_UNIT_M, CLASSES, fixture::shape())
+        Device::with_features(engine, &config, camera, DEPTH_UNIT_M, CLASSES, channels, shape)
             .unwrap();
     let mut r = Recording::new();
     let state = State::new(&Options::default());
@@ -53,7 +59,9 @@ fn device(engine: Engine, fusion: FusionConfig) -> Device {
         r.upload(tensor.values, 0, &state.buffers[name]);
     }
     for slot in 0..FRAMES {
-        d.upload_frame(&mut r, slot, &fixture::frame_of(&camera, slot));
+        let mut frame = fixture::frame_of(&camera, slot);
+        frame.features = (channels > 0).then(|| feature_map(channels as usize, slot));
+        d.upload_frame(&mut r, slot, &frame);
         d.upload_pose(&mut r, slot, &fixture::pose(slot));
     }
     d.upload_window(&mut r, &[(2, true), (0, true), (1, true)]);
@@ -75,6 +83,14 @@ fn device(engine: Engine, fusion: FusionConfig) -> Device {
     }
     set(&mut d, tensor.values, &values);
     d
+}
+
+/// A map of another size than the token grid, another one for each frame.
+fn feature_map(channels: usize, slot: u32) -> FeatureMap {
+    let (height, width) = (5, 8);
+    let mut random = TestRandom(450 + u64::from(slot));
+    let values = (0..channels * height * width).map(|_| random.uniform(-3.0, 3.0)).collect();
+    FeatureMap { channels, height, width, values }
 }
 
 fn read(d: &mut Device, buffer: BufferId, floats: usize) -> Vec<f32> {
@@ -193,6 +209,58 @@ fn fusion_gradients(fusion: FusionConfig) {
 #[test]
 fn gradients_of_the_fusion() {
     fusion_gradients(FusionConfig::default());
+}
+
+#[test]
+fn gradients_of_the_projection_of_feature_maps() {
+    let mut d = device_with(Engine::cpu(), FusionConfig::default(), 11);
+    fusion_loss(&mut d);
+    let f = d.fusion.as_ref().unwrap();
+    let tensor = f.parameters;
+    let layer = *f.layers.iter().find(|l| l.name == "feature projection").unwrap();
+    let gradient = read(&mut d, tensor.gradient, tensor.floats);
+    let weights = layer.weights as usize..(layer.weights + layer.weight_count()) as usize;
+    check(&mut d, tensor.values, &gradient, weights, layer.name, &mut fusion_loss);
+}
+
+/// The fusion reads the map of the frame's own slot, on the token grid, in place of the labels.
+#[test]
+fn feature_maps_take_the_place_of_labels() {
+    let channels = 11;
+    let semantic = |relabel: bool, other: bool| {
+        let mut d = device_with(Engine::cpu(), FusionConfig::default(), channels);
+        let mut frame = fixture::frame_of(&fixture::wide_camera(), SLOT);
+        frame.features = Some(feature_map(channels as usize, if other { 2 } else { SLOT }));
+        if relabel {
+            frame.labels.as_mut().unwrap().fill(1);
+        }
+        let mut r = Recording::new();
+        d.upload_frame(&mut r, SLOT, &frame);
+        d.record_fusion_forward(&mut r, SLOT);
+        d.engine.submit(&r).unwrap();
+        let f = d.fusion.as_ref().unwrap();
+        let (tokens, stride, count) = (f.tokens, f.stride as usize, f.count());
+        let layer = *f.layers.iter().find(|l| l.name == "feature projection").unwrap();
+        let parameters = f.parameters;
+        let tokens = read(&mut d, tokens, count * stride);
+        let at = SEMANTIC_AT as usize;
+        let rows = tokens.chunks_exact(stride);
+        let s: Vec<f32> = rows.flat_map(|row| row[at..at + 16].to_vec()).collect();
+        (s, read(&mut d, parameters.values, parameters.floats), layer)
+    };
+    let (s, w, layer) = semantic(false, false);
+    assert!(semantic(true, false).0 == s, "labels are not read");
+    assert!(semantic(false, true).0 != s, "the map is");
+    // 104 of the image's 109 columns of pixels are tokens, 56 of its 59 rows.
+    let map = feature_map(channels as usize, SLOT).resampled(13, 7, [104.0 / 109.0, 56.0 / 59.0]);
+    for (token, cell) in map.chunks_exact(channels as usize).enumerate() {
+        for o in 0..16 {
+            let weight = |i: usize| w[layer.weights as usize + i * 16 + o];
+            let expected: f32 = cell.iter().enumerate().map(|(i, x)| x * weight(i)).sum();
+            let found = s[token * 16 + o];
+            assert!((found - expected).abs() < 1e-4, "{token} {o}: {found} {expected}");
+        }
+    }
 }
 
 #[test]

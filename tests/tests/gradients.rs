@@ -8,7 +8,7 @@
 use glam::DVec3;
 use mte_slam_core::{
     camera::Camera,
-    config::{Config, LossConfig},
+    config::{Config, Head, LossConfig},
     device::{Batch, Device, Guidance, Rates, Trained},
     engine::Engine,
     frame::{Bounds, Frame},
@@ -68,14 +68,20 @@ struct Problem {
     device: Device,
     loss: LossConfig,
     flags: u32,
+    rays_per_frame: u32,
 }
 
 impl Problem {
     fn new(engine: Engine, loss: LossConfig) -> Problem {
-        let (camera, config): (Camera, Config) = (fixture::camera(), config());
+        Problem::of(engine, loss, config())
+    }
+
+    fn of(engine: Engine, loss: LossConfig, config: Config) -> Problem {
+        let camera: Camera = fixture::camera();
         let device =
             Device::new(engine, &config, camera, DEPTH_UNIT_M, CLASSES, fixture::shape()).unwrap();
-        let mut problem = Problem { device, loss, flags: FLAG_GUIDED | FLAG_MAP | FLAG_POSE };
+        let flags = FLAG_GUIDED | FLAG_MAP | FLAG_POSE;
+        let mut problem = Problem { device, loss, flags, rays_per_frame: RAYS_PER_FRAME };
         let state = State::new(&Options::default());
         let d = &mut problem.device;
         let mut r = Recording::new();
@@ -99,7 +105,7 @@ impl Problem {
     fn batch<'a>(&self, loss: &'a LossConfig) -> Batch<'a> {
         Batch {
             frames: FRAMES,
-            rays_per_frame: RAYS_PER_FRAME,
+            rays_per_frame: self.rays_per_frame,
             stratified: 14,
             surface: 6,
             flags: self.flags,
@@ -118,7 +124,7 @@ impl Problem {
         self.device.record_forward(&mut r, &batch);
         self.device.record_backward(&mut r, &batch);
         self.device.engine.submit(&r).unwrap();
-        let rays = FRAMES * RAYS_PER_FRAME;
+        let rays = FRAMES * self.rays_per_frame;
         let out = block_on(self.device.read_ray_out(rays)).unwrap();
         total_loss(&out, &loss)
     }
@@ -286,6 +292,42 @@ fn semantic_planes_decoder_and_head() {
     ] {
         check(&mut problem, weights, &decoders, part, name);
     }
+}
+
+/// The per-sample head: 32-256-256-256-C on every sample, logits composited.
+#[test]
+fn per_sample_head_and_semantic_planes() {
+    let mut config = config();
+    config.semantics.head = Head::Sample;
+    let mut problem = Problem::of(Engine::cpu(), losses(), config);
+    // A hundred times the work of a head that runs once a ray: fewer rays.
+    problem.rays_per_frame = 16;
+    let d = &problem.device;
+    assert!(d.fusion.is_none() && d.suppressor.is_none());
+    let head = d.sample_head.as_ref().unwrap();
+    let (t, layers) = (head.parameters, head.layers);
+    let mut values = problem.read(t.values, t.floats);
+    let mut random = TestRandom(503);
+    values.iter_mut().filter(|x| **x == 0.0).for_each(|x| *x = random.uniform(-0.1, 0.1));
+    problem.set(t, &values);
+    let [geometry, _, semantic, decoders] = problem.gradients();
+    let moments = problem.read(t.moment1, t.floats);
+    let gradient: Vec<f32> = moments.iter().map(|m| m * 10.0).collect();
+    for (i, layer) in layers.iter().enumerate() {
+        let part = layer.weights as usize..(layer.bias() + layer.outputs) as usize;
+        check(&mut problem, t, &gradient, part.clone(), &format!("layer {i}"));
+        let biases = gradient[layer.bias() as usize..part.end].iter();
+        assert!(biases.filter(|g| **g != 0.0).count() * 8 > layer.outputs as usize);
+    }
+    let planes = problem.device.semantic;
+    let fine = problem.device.shape.surface[1][3] as usize * 16;
+    check(&mut problem, planes, &semantic, 0..fine, "coarse semantic planes");
+    check(&mut problem, planes, &semantic, fine..semantic.len(), "fine semantic planes");
+    // The ray's decoders of classes rest; geometry gets what it gets without classes.
+    assert!(decoders[GEOMETRY_FLOATS + 1188..].iter().all(|g| *g == 0.0));
+    let mut without = Problem::new(Engine::cpu(), LossConfig { semantic: 0.0, ..losses() });
+    without.rays_per_frame = problem.rays_per_frame;
+    assert!(without.gradients()[0] == geometry);
 }
 
 /// Classes move neither geometry nor appearance nor poses.

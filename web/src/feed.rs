@@ -148,6 +148,7 @@ impl Stream {
             truth: info.truth.iter().map(pose).collect(),
             warnings: info.warnings,
             info: SequenceInfo {
+                feature_channels: 0,
                 name: if info.name.is_empty() { last_part(url) } else { info.name },
                 layout: "stream",
                 camera: info.camera,
@@ -203,6 +204,7 @@ impl Stream {
         connection.next = index + 1;
         self.open = Some(connection);
         Ok(Frame {
+            features: None,
             index,
             number: header.number,
             time_s: header.time_s,

@@ -1,6 +1,10 @@
 //! Every kind of bad input gives an error that names the file, what was found and what was
 //! expected; and good input is read back as it was written.
-use super::{test_support::*, *};
+use super::{
+    features::tests::{npy, ramp},
+    test_support::*,
+    *,
+};
 use crate::classes::UNLABELLED;
 
 fn assert_has(text: &str, parts: &[&str]) {
@@ -450,4 +454,36 @@ fn random_damage_never_panics() {
         }
     }
     assert!(good > 50 && bad > 500, "{good} read, {bad} refused");
+}
+
+#[test]
+fn feature_maps_are_read_by_frame_number_and_checked() {
+    let mut maps = MemorySource::new("dino");
+    for i in 0..3 {
+        maps.insert(format!("deep/{i:06}.npy"), ramp(5, 2, 3));
+    }
+    let with = |maps: &MemorySource| OpenOptions {
+        features: Some(Box::new(maps.clone())),
+        ..Default::default()
+    };
+    let mut s = open(Box::new(replica(3)), with(&maps)).unwrap();
+    assert_eq!(s.info().feature_channels, 5);
+    let map = s.frame(2).unwrap().features.unwrap();
+    assert_eq!((map.channels, map.height, map.width, map.values[29]), (5, 2, 3, 29.0));
+
+    let spoiled = |spoil: &dyn Fn(&mut MemorySource)| {
+        let mut maps = maps.clone();
+        spoil(&mut maps);
+        error_of(&replica(3), with(&maps))
+    };
+    let error = spoiled(&|m| m.insert("deep/000001.npy", ramp(4, 2, 3)));
+    assert_has(&error, &["000001.npy (frame 1)", "channels", "found 4", "5 as in 000000.npy"]);
+    let error = spoiled(&|m| m.insert("deep/000002.npy", npy("<f8", "5, 1, 1", &[0; 40])));
+    assert_has(&error, &["000002.npy (frame 2)", "dtype", "found <f8", "float32", "float16"]);
+    let error = spoiled(&|m| drop(m.remove("deep/000001.npy")));
+    assert_has(&error, &["000001.npy", "no such file in dino", "frame 1"]);
+    let error = spoiled(&|m| m.insert("deep/1.npy", ramp(5, 2, 3)));
+    assert_has(&error, &["frame number", "one file for each number"]);
+    let empty = with(&MemorySource::new("none"));
+    assert_has(&error_of(&replica(3), empty), &["none", "feature maps", "0 files", "000000.npy"]);
 }

@@ -11,6 +11,8 @@
 //! - the camera: `cam_params.json` (`{"camera": {w, h, fx, fy, cx, cy, scale}}`, `scale` in depth
 //!   units per metre, `k1 k2 p1 p2 k3` if there is distortion; also one folder up),
 //!   `camera-intrinsics.txt` (a 3x3 matrix) or `camera.txt` (`fx fy cx cy [k1 k2 p1 p2 k3]`);
+//! - feature maps, in a folder of their own: `000000.npy`, ... by frame number, channels x height x
+//!   width, float32 or float16;
 //! - `bound.json`: `{"bound": [[x0, x1], [y0, y1], [z0, z1]]}` in metres;
 //! - `classes.json`: `{"7": {"name": "bed", "color": [86, 117, 191]}}`, colour optional. Without
 //!   it a [`ClassList`] can be given, and else every id in the images is a class.
@@ -19,6 +21,7 @@
 mod class_list;
 mod decode;
 mod entries;
+mod features;
 mod folder;
 mod intrinsics;
 mod labels;

@@ -3,6 +3,7 @@ use super::{
     class_list::ClassList,
     decode::{self, Origin, Size},
     entries::{self, Entry},
+    features::Features,
     folder::{Folder, invalid, plural},
     intrinsics::Rectifier,
     labels::{ASPECT_TOLERANCE, Labels, Wanted},
@@ -47,6 +48,9 @@ pub struct OpenOptions {
     pub scale: f64,
     /// Where labels come from.
     pub labels: LabelSource,
+    /// Feature maps of the colour images: `000000.npy`, ... by frame number, float32 or float16,
+    /// channels x height x width, each over the whole image as it is stored.
+    pub features: Option<Box<dyn Source>>,
     /// The classes, instead of those of any `classes.json`.
     pub classes: Option<ClassList>,
     /// The raw label id that means "no label". By default the class named `void`, `unlabelled`
@@ -66,6 +70,7 @@ impl Default for OpenOptions {
             frames: None,
             scale: 1.0,
             labels: LabelSource::default(),
+            features: None,
             classes: None,
             unlabelled_raw_id: None,
             only_present_classes: false,
@@ -168,6 +173,14 @@ pub fn open(
         warnings.push(format!("{} without a label image", plural(bare, "frame")));
     }
 
+    let features = match options.features {
+        Some(source) => Some(Features::open(Folder::new(source)?, &frames)?),
+        None => None,
+    };
+    if features.is_some() && rectifier.is_some() {
+        warnings.push("feature maps are taken as they are, with lens distortion".into());
+    }
+
     let name = folder.name();
     let last = name.trim_end_matches(['/', '\\']).rsplit(['/', '\\']).next().unwrap_or_default();
     let info = SequenceInfo {
@@ -176,6 +189,7 @@ pub fn open(
         camera,
         depth_unit_m: all.depth_unit_m,
         frames: frames.len(),
+        feature_channels: features.as_ref().map_or(0, |f| f.channels),
         classes: labels.as_ref().map_or_else(ClassTable::default, |l| l.table.clone()),
         bounds: all.bounds,
     };
@@ -190,6 +204,7 @@ pub fn open(
         rectifier,
         resize,
         labels,
+        features,
         warnings,
     }))
 }
@@ -221,6 +236,7 @@ struct Reader {
     rectifier: Option<Rectifier>,
     resize: Resize,
     labels: Option<Labels>,
+    features: Option<Features>,
     warnings: Vec<String>,
 }
 
@@ -271,8 +287,9 @@ impl Sequence for Reader {
         let depth = self.fit_nearest(depth);
 
         let labels = self.labels(index)?;
+        let features = self.features.as_ref().map(|f| f.read(frame)).transpose()?;
         let (number, time_s, truth) = (entry.number, entry.time_s, entry.truth);
-        Ok(Frame { index, number, time_s, color, depth, labels, truth })
+        Ok(Frame { index, number, time_s, color, depth, labels, truth, features })
     }
 
     fn labels(&mut self, index: usize) -> Result<Option<Vec<u8>>, SequenceError> {

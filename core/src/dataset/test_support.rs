@@ -17,6 +17,7 @@ pub fn info() -> SequenceInfo {
     let class =
         |raw_id, name: &str| Class { raw_id, name: name.into(), color: [9, 8, raw_id as u8] };
     SequenceInfo {
+        feature_channels: 0,
         name: "tiny".into(),
         layout: "replica",
         camera: Camera { width: W, height: H, fx: 20.0, fy: 21.0, cx: 11.5, cy: 7.25 },
@@ -32,6 +33,7 @@ pub fn info() -> SequenceInfo {
 pub fn frame(i: usize) -> Frame {
     let n = W * H;
     Frame {
+        features: None,
         index: i,
         number: i as u64,
         time_s: i as f64,

@@ -5,6 +5,7 @@ use crate::{
     camera::Camera,
     config::FusionConfig,
     engine::{Engine, EngineError},
+    frame::FeatureMap,
     kernels::{
         Kernel,
         adam::{self, AdamParams},
@@ -68,7 +69,7 @@ impl Layer {
 }
 
 /// Layers in the order of the forward pass; names of `LAYERS` index it.
-fn layers(classes: u32, config: &FusionConfig) -> (Vec<Layer>, u32) {
+fn layers(classes: u32, channels: u32, config: &FusionConfig) -> (Vec<Layer>, u32) {
     let mut at = 0;
     let mut all = Vec::new();
     let mut add =
@@ -110,7 +111,12 @@ fn layers(classes: u32, config: &FusionConfig) -> (Vec<Layer>, u32) {
         (false, true, true),
     );
     add("geometry", false, HIDDEN_AT, HIDDEN, GEOMETRY_AT, 16, 1, linear);
-    add("class embedding", true, RAW_HISTOGRAM, classes, SEMANTIC_AT, 16, 1, plain);
+    if channels > 0 {
+        // Without bias: keys that all move alike change no softmax, so it would never learn.
+        add(FEATURE_LAYER, true, 0, channels, SEMANTIC_AT, 16, 1, plain);
+    } else {
+        add("class embedding", true, RAW_HISTOGRAM, classes, SEMANTIC_AT, 16, 1, plain);
+    }
     add("patch embedding", true, RAW_PATCH, PATCH_INPUTS, APPEARANCE_AT, 16, 1, linear);
     add("Q1", false, GEOMETRY_AT, 16, FIRST_AT, 16, 1, plain);
     add("K1", false, SEMANTIC_AT, 16, FIRST_AT + 16, 16, 1, plain);
@@ -124,6 +130,18 @@ fn layers(classes: u32, config: &FusionConfig) -> (Vec<Layer>, u32) {
     add("gate", false, GEOMETRY_AT, 48, GATE_AT, 3, config.gate_kernel, linear);
     add("colour head", false, FUSED_AT, 16, COLOR_AT, 3, 1, linear);
     (all, at)
+}
+
+/// The layer that reads feature maps, which lie in a buffer of their own.
+const FEATURE_LAYER: &str = "feature projection";
+
+/// Feature maps of the stored frames, on the token grid.
+#[derive(Clone, Copy, Debug)]
+pub struct FeatureMaps {
+    /// Channels, 0 without feature maps.
+    pub channels: u32,
+    /// Channels of each token of each slot.
+    pub buffer: BufferId,
 }
 
 /// Buffers of the fusion.
@@ -143,6 +161,7 @@ pub struct Fusion {
     /// Floats a token's activations take.
     pub stride: u32,
     config: FusionConfig,
+    maps: FeatureMaps,
     /// Origin of the encoded positions: it must not move when the map grows.
     origin_m: [f32; 4],
     raw: BufferId,
@@ -162,13 +181,14 @@ impl Fusion {
         origin_m: [f32; 4],
         camera: &Camera,
         classes: u32,
+        maps: FeatureMaps,
         seed: u32,
     ) -> Result<Fusion, EngineError> {
         let (columns, rows) = grid(camera, config);
         let tokens = (columns * rows) as usize;
         let padded = classes.next_multiple_of(4);
         let (stride, raw_stride) = (LOGITS_AT + padded, RAW_HISTOGRAM + padded);
-        let (layers, floats) = layers(classes, config);
+        let (layers, floats) = layers(classes, maps.channels, config);
         let fusion = Fusion {
             parameters: Trained::new(e, "fusion", floats as usize)?,
             columns,
@@ -177,6 +197,7 @@ impl Fusion {
             token_gradient: e.create_buffer("token gradients", tokens * stride as usize)?,
             stride,
             config: config.clone(),
+            maps,
             origin_m,
             raw: e.create_buffer("raw tokens", tokens * raw_stride as usize)?,
             raw_stride,
@@ -218,6 +239,36 @@ impl Fusion {
             (l.taps * l.taps * l.inputs * outputs + biases) as usize
         })
         .sum()
+    }
+
+    /// Puts a frame's feature map on the token grid of a slot.
+    pub(super) fn upload_features(
+        &self,
+        r: &mut Recording,
+        slot: u32,
+        map: &FeatureMap,
+        camera: &Camera,
+    ) {
+        if map.channels != self.maps.channels as usize {
+            return;
+        }
+        // Pixels right of and below the last whole token belong to none.
+        let covered = |tokens: u32, pixels: u32| {
+            (tokens * self.config.token_pixels) as f32 / pixels.max(1) as f32
+        };
+        let extent = [covered(self.columns, camera.width), covered(self.rows, camera.height)];
+        let values = map.resampled(self.columns as usize, self.rows as usize, extent);
+        r.upload(self.maps.buffer, slot as usize * values.len(), &values);
+    }
+
+    /// What a layer's kernels read as raw inputs, and their parameters for it.
+    fn raw_inputs(&self, layer: &Layer, p: TokenParams) -> (BufferId, TokenParams) {
+        if layer.name != FEATURE_LAYER {
+            return (self.raw, p);
+        }
+        let channels = self.maps.channels;
+        let input = p.slot * self.count() as u32 * channels;
+        (self.maps.buffer, TokenParams { raw_stride: channels, input, ..p })
     }
 
     /// Tokens of a frame.
@@ -293,10 +344,11 @@ impl Device {
             if layer.name == "depthwise" || (layer.name == "pointwise" && !f.config.local) {
                 record_attention(r, f, &ATTEND_TOKENS, &second(f, p), n);
             }
+            let (raw, p) = f.raw_inputs(layer, layer_params(layer, p));
             r.dispatch_1d(
                 &TOKEN_LAYER,
-                &layer_params(layer, p),
-                &[f.parameters.values, f.raw, f.tokens],
+                &p,
+                &[f.parameters.values, raw, f.tokens],
                 n * layer.outputs.div_ceil(4) as usize,
             );
         }
@@ -337,7 +389,7 @@ impl Device {
             if layer.name == "V1" {
                 record_attention_backward(r, f, &first(f, p));
             }
-            let p = layer_params(layer, p);
+            let (raw, p) = f.raw_inputs(layer, layer_params(layer, p));
             let taps = (layer.taps * layer.taps) as usize;
             let quads = layer.outputs.div_ceil(4) as usize;
             let jobs = taps * layer.inputs as usize * if layer.depthwise { 1 } else { quads }
@@ -345,7 +397,7 @@ impl Device {
             r.dispatch_1d(
                 &TOKEN_WEIGHTS,
                 &p,
-                &[f.raw, f.tokens, f.token_gradient, f.partials],
+                &[raw, f.tokens, f.token_gradient, f.partials],
                 jobs * n.div_ceil(p.chunk as usize),
             );
             // The loss has already sent the colour head's gradient on to F.

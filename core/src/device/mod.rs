@@ -1,14 +1,16 @@
 //! The map's buffers on an engine, and the recordings of one pass over a batch of rays.
 mod fusion;
 mod passes;
+mod sample_head;
 mod suppressor;
 
-pub use fusion::{Fusion, Layer};
+pub use fusion::{FeatureMaps, Fusion, Layer};
+pub use sample_head::{SampleHead, SampleLayer};
 pub use suppressor::{AnchorCounts, Suppressor};
 
 use crate::{
     camera::Camera,
-    config::{Config, LossConfig},
+    config::{Config, Head, LossConfig},
     engine::{Engine, EngineError},
     field::{FieldShape, decoder_floats, initial_decoders, initial_planes},
     frame::Frame,
@@ -16,9 +18,9 @@ use crate::{
         align_points::{ALIGN_POINTS, ALIGN_ROW},
         pose_step::POSE_STATE_FLOATS,
         query_points::QUERY_POINTS,
-        shared::{FLAG_MAP, RAY_WORDS},
+        shared::{FLAG_ANCHORS, FLAG_MAP, RAY_WORDS},
     },
-    layout::{FieldParams, GEOMETRY_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS},
+    layout::{FieldParams, GEOMETRY_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS, TARGET_FLOATS},
     pose::Pose,
     recording::{BufferId, Recording},
 };
@@ -162,6 +164,8 @@ pub struct Device {
     pub fusion: Option<Fusion>,
     /// Feature redundancy suppressor, where there are classes.
     pub suppressor: Option<Suppressor>,
+    /// The per-sample class head, where it is configured and there are classes.
+    pub sample_head: Option<SampleHead>,
     /// Number of classes.
     pub classes: u32,
     /// Steps Adam has taken.
@@ -205,21 +209,37 @@ impl Device {
     /// Makes every buffer and the map's first values. Fails, with the numbers, when a buffer
     /// passes what the engine can bind.
     pub fn new(
-        mut engine: Engine,
+        engine: Engine,
         config: &Config,
         camera: Camera,
         depth_unit_m: f64,
         classes: u32,
         shape: FieldShape,
     ) -> Result<Device, EngineError> {
+        Self::with_features(engine, config, camera, depth_unit_m, classes, 0, shape)
+    }
+
+    /// As [`Device::new`], for frames with feature maps of so many channels (0 for none): the fusion
+    /// reads them in place of label histograms.
+    pub fn with_features(
+        mut engine: Engine,
+        config: &Config,
+        camera: Camera,
+        depth_unit_m: f64,
+        classes: u32,
+        feature_channels: u32,
+        shape: FieldShape,
+    ) -> Result<Device, EngineError> {
         let e = &mut engine;
         let pixels = camera.pixels();
         // An image smaller than a token has nothing to fuse.
         let targets = fusion::target_floats(&camera, &config.fusion);
-        let fused = classes > 0 && config.fusion.enabled && targets > 0;
+        let per_sample = classes > 0 && config.semantics.head == Head::Sample;
+        let fused = classes > 0 && config.fusion.enabled && targets > 0 && !per_sample;
         let targets = if fused { targets } else { 0 };
-        let slot_bytes = pixels * 4 + pixels.div_ceil(2) * 4 + targets * 4;
-        let by_limit = e.max_buffer_words() / pixels.max(targets);
+        let maps = if fused { targets / TARGET_FLOATS * feature_channels as usize } else { 0 };
+        let slot_bytes = pixels * 4 + pixels.div_ceil(2) * 4 + (targets + maps) * 4;
+        let by_limit = e.max_buffer_words() / pixels.max(targets).max(maps);
         let slots = (config.keyframes.budget_mib as usize * (1 << 20) / slot_bytes)
             .min(by_limit)
             .clamp(4, 1024) as u32;
@@ -257,7 +277,12 @@ impl Device {
         let fusion = if fused {
             let origin = [shape.bounds.min.x, shape.bounds.min.y, shape.bounds.min.z, 0.0];
             let f = config.fusion.clone();
-            Some(Fusion::new(e, &f, origin.map(|x| x as f32), &camera, classes, config.seed)?)
+            let origin = origin.map(|x| x as f32);
+            let maps = FeatureMaps {
+                channels: feature_channels,
+                buffer: e.create_buffer("feature maps", (slots as usize * maps).max(4))?,
+            };
+            Some(Fusion::new(e, &f, origin, &camera, classes, maps, config.seed)?)
         } else {
             None
         };
@@ -266,8 +291,13 @@ impl Device {
             base.token_rows = f.rows;
             base.token_size = config.fusion.token_pixels;
         }
-        let suppressor = if classes > 0 && config.suppressor.enabled {
+        let suppressor = if classes > 0 && config.suppressor.enabled && !per_sample {
             Some(Suppressor::new(e, &config.suppressor, classes)?)
+        } else {
+            None
+        };
+        let sample_head = if per_sample {
+            Some(SampleHead::new(e, classes, trained_samples, max_rays, config.seed)?)
         } else {
             None
         };
@@ -279,6 +309,7 @@ impl Device {
             decoders: Trained::new(e, "decoders", decoder_floats(classes))?,
             fusion,
             suppressor,
+            sample_head,
             classes,
             step: 0,
             slots,
@@ -328,6 +359,11 @@ impl Device {
         Ok(device)
     }
 
+    /// Classes that are decoded once a ray: none with a per-sample head.
+    fn ray_classes(&self) -> u32 {
+        if self.sample_head.is_some() { 0 } else { self.classes }
+    }
+
     /// Largest batch a dense pass may have.
     pub fn max_rays(&self) -> u32 {
         self.max_rays
@@ -349,6 +385,9 @@ impl Device {
         r.upload(self.color_images, slot as usize * pixels, &color);
         r.upload(self.depth_images, slot as usize * pixels.div_ceil(2), &depth);
         r.clear(self.pose_state, slot as usize * POSE_STATE_FLOATS, POSE_STATE_FLOATS);
+        if let (Some(f), Some(map)) = (&self.fusion, &frame.features) {
+            f.upload_features(r, slot, map, &self.camera);
+        }
     }
 
     /// Weights of the classes in the cross-entropy of rays and of the fusion, one a class.
@@ -455,7 +494,16 @@ impl Device {
 
     /// 8 floats a point: distance, class (bits), 0, 0, red, green, blue, 0.
     pub async fn query_surface(&mut self, points: &[[f32; 4]]) -> Result<Vec<f32>, EngineError> {
-        self.query(points, FLAG_MAP, 8).await
+        let by_anchors = self.suppressor.as_ref().is_some_and(Suppressor::infers);
+        let flags = FLAG_MAP | if by_anchors { FLAG_ANCHORS } else { 0 };
+        let mut values = self.query(points, flags, 8).await?;
+        if self.sample_head.is_some() {
+            let classes = self.sample_classes(points).await?;
+            for (value, class) in values.chunks_exact_mut(8).zip(classes) {
+                value[1] = f32::from_bits(class);
+            }
+        }
+        Ok(values)
     }
 
     async fn query(
@@ -471,6 +519,8 @@ impl Device {
             let mut p = self.base;
             p.rays = chunk.len() as u32;
             p.flags = flags;
+            p.classes = self.ray_classes();
+            p.anchors = self.suppressor.as_ref().map_or(0, Suppressor::slots);
             r.dispatch_1d(
                 &QUERY_POINTS,
                 &p,
@@ -480,6 +530,7 @@ impl Device {
                     self.appearance.values,
                     self.semantic.values,
                     self.decoders.values,
+                    self.suppressor.as_ref().map_or(self.no_anchors, |s| s.anchors),
                     self.values,
                 ],
                 chunk.len(),

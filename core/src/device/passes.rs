@@ -59,9 +59,11 @@ impl Device {
         p
     }
 
-    /// Rays, samples, signed distances, compositing, decoding and their losses.
+    /// Rays, samples, signed distances, compositing, decoding and their losses. A per-sample head
+    /// is run here for views only: training runs it with its gradients, and poses do not see it.
     pub fn record_forward(&self, r: &mut Recording, b: &Batch<'_>) {
-        let p = self.params(b);
+        let full = self.params(b);
+        let p = FieldParams { classes: self.ray_classes(), ..full };
         let (rays, samples) = (p.rays as usize, (p.rays * p.samples) as usize);
         let (geometry, decoders) = (self.geometry.values, self.decoders.values);
         r.dispatch_1d(
@@ -106,6 +108,9 @@ impl Device {
             ],
             rays,
         );
+        if b.flags & (FLAG_MAP | FLAG_POSE) == 0 {
+            self.record_sample_classes(r, &full);
+        }
         if b.flags & FLAG_MASK != 0 {
             r.dispatch(&MASK_RAYS, &p, &[self.ray_out], [1, 1, 1]);
         }
@@ -176,16 +181,21 @@ impl Device {
                 rays * 24,
             );
             self.record_scatter_surface(r, b);
+            self.record_sample_backward(r, &p);
         }
     }
 
     /// Gradients of the semantics alone: what [`Device::record_semantic_step`] needs.
     pub fn record_semantic_backward(&self, r: &mut Recording, b: &Batch<'_>) {
-        self.record_scatter_surface(r, b);
+        if self.sample_head.is_some() {
+            self.record_sample_backward(r, &self.params(b));
+        } else {
+            self.record_scatter_surface(r, b);
+        }
     }
 
     fn record_scatter_surface(&self, r: &mut Recording, b: &Batch<'_>) {
-        let p = self.params(b);
+        let p = FieldParams { classes: self.ray_classes(), ..self.params(b) };
         let rays = p.rays as usize;
         r.dispatch_1d(
             &SCATTER_SURFACE,
@@ -199,7 +209,7 @@ impl Device {
                 self.semantic.gradient,
                 self.status,
             ],
-            rays * if self.classes > 0 { 48 } else { 24 },
+            rays * if p.classes > 0 { 48 } else { 24 },
         );
     }
 
@@ -260,7 +270,7 @@ impl Device {
             (32, 32, STATE_APPEARANCE, STATE_COLOR_HIDDEN_DELTA, 0, 1024),
             (32, 4, STATE_COLOR_HIDDEN, STATE_COLOR_DELTA, 1056, 1184),
         ];
-        if self.classes > 0 {
+        if self.ray_classes() > 0 {
             layers.push((32, 32, STATE_SEMANTIC, STATE_SEMANTIC_HIDDEN_DELTA, 1188, 2212));
             layers.push((32, 16, STATE_SEMANTIC_HIDDEN, STATE_FEATURE_DELTA, 2244, 2756));
             layers.push((16, self.classes, STATE_FEATURE, 0, 2772, 2772 + self.classes * 16));
@@ -332,5 +342,6 @@ impl Device {
             update(&self.semantic, Some(p.scale_semantic), rates.planes);
         }
         update(&self.decoders, None, rates.decoders);
+        self.record_sample_step(r, rates);
     }
 }

@@ -1,7 +1,7 @@
 //! Feature redundancy suppressor (paper III-B) on the device.
 use super::{Batch, Device};
 use crate::{
-    config::{AnchorRule, SuppressorConfig},
+    config::{AnchorRule, Inference, SuppressorConfig},
     engine::{Engine, EngineError},
     kernels::{
         maintain_anchors::{MAINTAIN_ANCHORS, MaintainAnchorsParams},
@@ -57,6 +57,11 @@ impl Suppressor {
         r.upload(s.anchors, 0, &free);
         e.submit(&r)?;
         Ok(s)
+    }
+
+    /// Whether classes are those of the nearest anchors.
+    pub fn infers(&self) -> bool {
+        self.config.inference == Inference::Anchors
     }
 
     /// Slots of anchors.

@@ -43,9 +43,9 @@ fn get<const N: usize>(state: &[AtomicU32], at: u32) -> [f32; N] {
     core::array::from_fn(|k| load_f32(&state[at as usize * 4 + k]))
 }
 
-struct Match {
-    index: u32,
-    class: u32,
+pub(super) struct Match {
+    pub(super) index: u32,
+    pub(super) class: u32,
     distance: f32,
     /// The nearest anchor of the ray's own class.
     own_index: u32,
@@ -68,7 +68,12 @@ impl Match {
 }
 
 /// The nearest anchor of a feature (paper eq. 9), squared distances.
-fn nearest_anchor(p: &FieldParams, anchors: &[f32], feature: &[f32; 16], label: u32) -> Match {
+pub(super) fn nearest_anchor(
+    p: &FieldParams,
+    anchors: &[f32],
+    feature: &[f32; 16],
+    label: u32,
+) -> Match {
     let mut best = Match {
         index: NO_ANCHOR,
         class: 255,

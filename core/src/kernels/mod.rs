@@ -137,6 +137,8 @@ registry! {
     maintain_anchors: MAINTAIN_ANCHORS,
     /// Outliers of tracking.
     mask_rays: MASK_RAYS,
+    /// Layers on samples.
+    matrix_product: MATRIX_PRODUCT,
     /// Rays' pose gradients.
     pose_gradient: POSE_GRADIENT,
     /// Pose updates.
@@ -149,6 +151,10 @@ registry! {
     reduce_partials: REDUCE_PARTIALS,
     /// Sample placement.
     sample_depths: SAMPLE_DEPTHS,
+    /// Semantic features of samples.
+    sample_features: SAMPLE_FEATURES,
+    /// Classes from samples.
+    sample_logits: SAMPLE_LOGITS,
     /// Pixels and rays.
     sample_rays: SAMPLE_RAYS,
     /// Gradients into the geometry planes.

@@ -1,13 +1,15 @@
 //! The field at single points.
+use super::decode_rays::nearest_anchor;
 use super::shared::{
-    FLAG_MAP, Grid, class_logit, color_hidden, color_output, geometry_decoder, semantic_hidden,
-    semantic_output, surface_weights,
+    FLAG_ANCHORS, FLAG_MAP, Grid, class_logit, color_hidden, color_output, geometry_decoder,
+    semantic_hidden, semantic_output, surface_weights,
 };
 use super::{CpuDispatch, store_f32, store_u32};
-use crate::layout::FieldParams;
+use crate::layout::{FieldParams, NO_ANCHOR};
 
 kernel! {
-    /// Signed distance \[truncations\] at points; with `FLAG_MAP` colour and class too.
+    /// Signed distance \[truncations\] at points; with `FLAG_MAP` colour and class too, with
+    /// `FLAG_ANCHORS` the class of the nearest anchor.
     pub static QUERY_POINTS = "query_points" {
         workgroup_size: 64,
         params: FieldParams,
@@ -18,6 +20,7 @@ kernel! {
             planes_appearance: Read,
             planes_semantic: Read,
             decoders: Read,
+            anchors: Read,
             values: ReadWrite,
         ],
     }
@@ -29,7 +32,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
     let (geometry, appearance, semantic) =
         (dispatch.read_f32(1), dispatch.read_f32(2), dispatch.read_f32(3));
     let decoders = dispatch.read_f32(4);
-    let values = dispatch.write(5);
+    let (anchors, values) = (dispatch.read_f32(5), dispatch.write(6));
     let (grid, surface_grid) = (Grid::geometry(&p), Grid::surface(&p));
     let surface = surface_weights(decoders);
     dispatch.for_each_invocation(|i| {
@@ -54,6 +57,12 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                 if logit > best {
                     best = logit;
                     best_class = c;
+                }
+            }
+            if p.flags & FLAG_ANCHORS != 0 {
+                let nearest = nearest_anchor(&p, anchors, &feature, 255);
+                if nearest.index != NO_ANCHOR {
+                    best_class = nearest.class;
                 }
             }
         }

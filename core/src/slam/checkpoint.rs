@@ -7,7 +7,7 @@ use crate::{
     device::{Device, Trained},
     engine::Engine,
     field::FieldShape,
-    frame::{Bounds, SequenceInfo},
+    frame::{Bounds, MAX_FEATURE_CHANNELS, SequenceInfo},
     layout::ANCHOR_FLOATS,
     pose::Pose,
     recording::{BufferId, Recording},
@@ -63,15 +63,24 @@ struct State {
     depth_unit_m: f64,
     classes: ClassTable,
     bounds: Bounds,
+    #[serde(default)]
+    feature_channels: usize,
     step: u32,
     times_s: Vec<f64>,
     /// 0 first, 1 tracked, 2 lost.
     statuses: Vec<u8>,
     poses: Vec<[f64; 16]>,
     observed_frames: Vec<usize>,
+    #[serde(default = "yes")]
+    labelled: bool,
     /// Where the colours lie that the map was trained with.
     #[serde(default)]
     colour_registration: ColourRegistration,
+}
+
+/// Maps saved before it was noted had labels, if classes.
+fn yes() -> bool {
+    true
 }
 
 fn tensor<T: bytemuck::Pod>(name: &str, dtype: Dtype, shape: Vec<usize>, values: &[T]) -> Tensor {
@@ -121,11 +130,13 @@ impl Slam {
             depth_unit_m: self.info.depth_unit_m,
             classes: self.info.classes.clone(),
             bounds,
+            feature_channels: self.info.feature_channels,
             step,
             times_s: self.frames.iter().map(|f| f.time_s).collect(),
             statuses: self.frames.iter().map(|f| f.status as u8).collect(),
             poses: self.frames.iter().map(|f| f.world_from_camera.to_row_major()).collect(),
             observed_frames: self.observations.iter().map(|o| o.frame).collect(),
+            labelled: self.labelled(),
             colour_registration: self.registration,
         };
         let json = serde_json::to_string(&state).map_err(|e| wrong("state", e, "JSON"))?;
@@ -165,6 +176,7 @@ impl Slam {
             return Err(wrong("camera", format!("{camera:?}"), "an image size"));
         }
         let info = SequenceInfo {
+            feature_channels: state.feature_channels,
             name: state.name,
             layout: "checkpoint",
             camera,
@@ -176,10 +188,16 @@ impl Slam {
         if info.classes.len() > 255 {
             return Err(wrong("classes", info.classes.len(), "at most 255"));
         }
+        if info.feature_channels > MAX_FEATURE_CHANNELS {
+            let expected = format!("at most {MAX_FEATURE_CHANNELS}");
+            return Err(wrong("feature_channels", info.feature_channels, expected));
+        }
         let shape = FieldShape::new(state.bounds, &state.config.field);
         let classes = info.classes.len() as u32;
         let unit = info.depth_unit_m;
-        let mut device = Device::new(engine, &state.config, camera, unit, classes, shape)?;
+        let channels = info.feature_channels as u32;
+        let mut device =
+            Device::with_features(engine, &state.config, camera, unit, classes, channels, shape)?;
         device.step = state.step;
         let find = |name: &str| {
             checkpoint
@@ -224,6 +242,7 @@ impl Slam {
         }
         let mut slam = Slam::new(device_placeholder(), state.config, &info).await?;
         slam.registration = state.colour_registration;
+        slam.restored_labels = state.labelled && classes > 0;
         let depth = find("observed_depth")?;
         let all: Vec<u32> = bytemuck::pod_collect_to_vec(&depth.bytes);
         let step = super::mapping::observation_step(camera.width);
@@ -269,6 +288,7 @@ fn parameters(device: &Device) -> Vec<(&'static str, Trained)> {
         ("decoders", device.decoders),
     ];
     all.extend(device.fusion.as_ref().map(|f| ("fusion", f.parameters)));
+    all.extend(device.sample_head.as_ref().map(|h| ("sample_head", h.parameters)));
     all
 }
 

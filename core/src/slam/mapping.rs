@@ -201,7 +201,9 @@ impl Slam {
             let Some(engine) = self.engine.take() else { return Err(SlamError::NoMap) };
             let classes = self.info.classes.len() as u32;
             let (c, unit) = (self.info.camera, self.info.depth_unit_m);
-            let device = Device::new(engine, &self.config, c, unit, classes, shape)?;
+            let channels = self.info.feature_channels as u32;
+            let device =
+                Device::with_features(engine, &self.config, c, unit, classes, channels, shape)?;
             self.free_slots = (1..device.slots).rev().collect();
             self.device = Some(device);
             return Ok(());

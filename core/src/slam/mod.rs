@@ -169,6 +169,8 @@ pub struct Slam {
     iteration: u32,
     bounds_refused: bool,
     class_counts: semantics::ClassCounts,
+    /// Restored from a map that had labels.
+    restored_labels: bool,
     mapping_calls: u32,
     anchor_history: Vec<(usize, AnchorCounts)>,
     clock: Option<fn() -> f64>,
@@ -203,6 +205,7 @@ impl Slam {
             iteration: 0,
             bounds_refused: false,
             class_counts: semantics::ClassCounts::default(),
+            restored_labels: false,
             mapping_calls: 0,
             anchor_history: Vec::new(),
             clock: None,
@@ -347,6 +350,25 @@ impl Slam {
                     expected: format!("{pixels} pixels"),
                 });
             }
+        }
+        let channels = frame.features.as_ref().map_or(0, |f| f.channels);
+        if channels != self.info.feature_channels {
+            return Err(SlamError::Frame {
+                frame: frame.index,
+                field: "feature map",
+                found: format!("{channels} channels"),
+                expected: format!("{} channels", self.info.feature_channels),
+            });
+        }
+        if let Some(f) = &frame.features
+            && (f.values.len() != f.channels * f.height * f.width || f.values.is_empty())
+        {
+            return Err(SlamError::Frame {
+                frame: frame.index,
+                field: "feature map",
+                found: format!("{} values", f.values.len()),
+                expected: format!("{} x {} x {}", f.channels, f.height, f.width),
+            });
         }
         if frame.truth.is_some_and(|p| !p.is_finite()) {
             return Err(SlamError::Frame {

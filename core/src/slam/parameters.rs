@@ -10,7 +10,7 @@ pub struct ParameterCounts {
     pub semantic_planes: usize,
     /// Decoder of composited semantic features, 32-32-16.
     pub semantic_decoder: usize,
-    /// Class head on semantic features.
+    /// Class head: on a ray's semantic feature, or the whole perceptron on samples.
     pub class_head: usize,
     /// Feature fusion (0 when off).
     pub fusion: usize,
@@ -40,6 +40,13 @@ impl Slam {
         }
         let in_use = device.read_anchor_counts().await?;
         let inputs = 2 * CHANNELS;
+        if let Some(head) = &device.sample_head {
+            return Ok(ParameterCounts {
+                semantic_planes: device.semantic.floats,
+                class_head: head.parameters.floats,
+                ..ParameterCounts::default()
+            });
+        }
         Ok(ParameterCounts {
             semantic_planes: device.semantic.floats,
             semantic_decoder: inputs * inputs + inputs + inputs * FEATURE + FEATURE,

@@ -24,6 +24,11 @@ impl ClassCounts {
         }
     }
 
+    /// Whether there was any label.
+    pub fn any(&self) -> bool {
+        self.0.iter().any(|n| *n > 0.0)
+    }
+
     /// Weights by inverse frequency to the power of `balance`; the mean pixel weighs 1.
     pub fn weights(&self, balance: f64) -> Vec<f32> {
         let total: f64 = self.0.iter().sum();
@@ -40,6 +45,12 @@ pub(super) fn steps_due(steps: u32, iterations: u32, iteration: u32) -> u32 {
 }
 
 impl Slam {
+    /// Whether any pixel that the map has learnt from had a class; without, its classes mean
+    /// nothing.
+    pub fn labelled(&self) -> bool {
+        self.restored_labels || self.class_counts.any()
+    }
+
     /// Weight of the compression loss by stage: features must have settled before they are held.
     pub(super) fn compression(&self, c: &SuppressorConfig) -> f64 {
         let since = f64::from(self.mapping_calls) - f64::from(c.start);

@@ -106,6 +106,7 @@ impl SyntheticSequence {
             SceneKind::Office => "synthetic-office",
         };
         let info = SequenceInfo {
+            feature_channels: 0,
             name: name.to_string(),
             layout: "synthetic",
             camera,
@@ -145,6 +146,7 @@ impl Sequence for SyntheticSequence {
             image.depth_m.iter().map(|&z| sensor::quantise(z)).collect()
         };
         Ok(Frame {
+            features: None,
             index,
             number: index as u64,
             time_s: self.time_s(index),

@@ -3,7 +3,7 @@
 //! All rows and seeds go through the same pieces as `run`, in this process, one after another. A
 //! finished run is kept in OUT/runs, so an interrupted ablation goes on where it ended.
 use crate::{
-    args::AblateArgs,
+    args::{AblateArgs, AblationRow},
     class_truth::ClassTruth,
     configuration,
     engine::{self, Chosen},
@@ -11,7 +11,7 @@ use crate::{
     evaluation::{self, ViewScores},
     input::{self, Prepared},
     output::{
-        ablation::{Ablation, ClassScores, FinishedRun, Row, RunKey},
+        ablation::{Ablation, ClassScores, FinishedRun, Row, RunKey, Variant},
         folder::replace_file,
         metrics::Metrics,
         pictures,
@@ -22,7 +22,7 @@ use crate::{
 };
 use anyhow::{Context, Result, bail};
 use mte_slam_core::{
-    config::{Config, Inference},
+    config::{Config, Head, Inference},
     sequence::Sequence,
     slam::{Slam, TrackingStatus},
 };
@@ -34,11 +34,32 @@ use std::{
     time::Instant,
 };
 
-/// Name, fusion, suppressor of each row.
-const ROWS: [(&str, bool, bool); 4] =
-    [("neither", false, false), ("MTFF", true, false), ("FRS", false, true), ("both", true, true)];
 /// Keys that rows and seeds decide.
-const OURS: [&str; 3] = ["seed", "fusion.enabled", "suppressor.enabled"];
+const OURS: [&str; 5] =
+    ["seed", "fusion.enabled", "fusion.local", "suppressor.enabled", "semantics.head"];
+
+/// What a row is, and the name of its files.
+fn variant(row: AblationRow) -> (Variant, &'static str) {
+    let of = |name: &str, fusion, suppressor| Variant {
+        name: name.to_owned(),
+        fusion,
+        local: fusion,
+        suppressor,
+        head: Head::Ray,
+    };
+    match row {
+        AblationRow::Neither => (of("neither", false, false), "neither"),
+        AblationRow::Mtff => (of("MTFF", true, false), "mtff"),
+        AblationRow::Frs => (of("FRS", false, true), "frs"),
+        AblationRow::Both => (of("both", true, true), "both"),
+        AblationRow::NoLocal => {
+            (Variant { local: false, ..of("both, no local module", true, true) }, "no-local")
+        }
+        AblationRow::SampleHead => {
+            (Variant { head: Head::Sample, ..of("per-sample head", false, false) }, "sample-head")
+        }
+    }
+}
 
 /// One run of the plan.
 struct Planned {
@@ -58,6 +79,10 @@ pub fn run(args: &AblateArgs, screen: Screen) -> Result<()> {
         if OURS.contains(&key) {
             usage!("--set {text}: `{key}` is what ablate changes itself, expected another key");
         }
+    }
+    let rows = &args.rows;
+    if let Some((i, row)) = rows.iter().enumerate().find(|(i, row)| rows[..*i].contains(row)) {
+        usage!("--rows: found {row:?} twice (entry {}), expected every row once", i + 1);
     }
     let Prepared { mut sequence, effective, mut class_truth, record } =
         input::prepare(&args.dataset, &args.selection, &args.config, screen)?;
@@ -84,6 +109,7 @@ pub fn run(args: &AblateArgs, screen: Screen) -> Result<()> {
         scale: record.scale,
         labels: record.labels.clone(),
         truth_labels: record.truth_labels.clone(),
+        features: record.features.clone(),
         classes: record.classes.clone(),
         unlabelled: record.unlabelled,
         render_every: args.render_every,
@@ -93,7 +119,7 @@ pub fn run(args: &AblateArgs, screen: Screen) -> Result<()> {
     // Seed by seed, so that rows can be compared long before the last run.
     let mut plan = Vec::new();
     for &seed in &seeds {
-        for row in ROWS {
+        for &row in rows {
             plan.push(planned(&out, &key, &effective.config, row, seed)?);
         }
     }
@@ -154,7 +180,7 @@ pub fn run(args: &AblateArgs, screen: Screen) -> Result<()> {
     let of_row = |name: &str| -> Vec<FinishedRun> {
         finished.iter().filter(|r| r.key.row == name).cloned().collect()
     };
-    let neither = of_row(ROWS[0].0);
+    let neither = of_row(&variant(AblationRow::Neither).0.name);
     let mut warnings: Vec<String> = Vec::new();
     for warning in finished.iter().flat_map(|r| &r.warnings) {
         if !warnings.contains(warning) {
@@ -171,9 +197,13 @@ pub fn run(args: &AblateArgs, screen: Screen) -> Result<()> {
         seeds,
         render_every: args.render_every,
         input_labels: first.and_then(|r| r.input_labels.clone()),
-        rows: ROWS
+        rows: rows
             .iter()
-            .map(|&(name, f, s)| Row::new(name, (f, s), of_row(name), &neither))
+            .map(|&row| {
+                let variant = variant(row).0;
+                let runs = of_row(&variant.name);
+                Row::new(variant, runs, &neither)
+            })
             .collect(),
         protocols: protocols(first, args),
         warnings,
@@ -253,20 +283,24 @@ fn planned(
     out: &Path,
     key: &RunKey,
     config: &Config,
-    (name, fusion, suppressor): (&str, bool, bool),
+    row: AblationRow,
     seed: u32,
 ) -> Result<Planned> {
+    let (row, file) = variant(row);
     let mut config = config.clone();
     config.seed = seed;
-    config.fusion.enabled = fusion;
-    config.suppressor.enabled = suppressor;
-    if !suppressor {
+    config.fusion.enabled = row.fusion;
+    // Without fusion there is no local module to leave out; the hash must not depend on it.
+    config.fusion.local = row.local || !row.fusion;
+    config.suppressor.enabled = row.suppressor;
+    config.semantics.head = row.head;
+    if !row.suppressor {
         // There are no anchors to infer from.
         config.suppressor.inference = Inference::Head;
     }
     let config_hash = configuration::hash(&config)?;
-    let key = RunKey { row: name.to_owned(), seed, config_hash, ..key.clone() };
-    let path = out.join("runs").join(format!("{}-{seed}.json", name.to_lowercase()));
+    let key = RunKey { row: row.name, seed, config_hash, ..key.clone() };
+    let path = out.join("runs").join(format!("{file}-{seed}.json"));
     let finished = if path.exists() { Some(read_run(&path, &key)?) } else { None };
     Ok(Planned { config, key, path, finished })
 }
@@ -353,6 +387,7 @@ fn run_one(
         wall_s: start.elapsed().as_secs_f64(),
         parameters: block_on(slam.parameters())?,
         small_classes: (semantics.report.small_classes.len(), semantics.small_share_percent),
+        small_class_names: semantics.small_class_names(),
         warnings,
         protocols,
     };
@@ -380,8 +415,10 @@ fn protocols(first: Option<&FinishedRun>, args: &AblateArgs) -> BTreeMap<String,
     let mut add = |what: &str, protocol: String| all.insert(what.to_owned(), protocol);
     add(
         "rows",
-        "MTFF is `fusion.enabled`, FRS `suppressor.enabled`; everything else is the same, but \
-         classes come from the class head where there are no anchors"
+        "MTFF is `fusion.enabled`, its local module `fusion.local`, FRS `suppressor.enabled`, the \
+         per-sample head (SNI-SLAM's, 32-256-256-256-C, logits composited) `semantics.head`; \
+         everything else is the same, but classes come from the class head where there are no \
+         anchors"
             .to_owned(),
     );
     add(

@@ -4,12 +4,19 @@
 //! the map; its content does not change the work. Whole iterations are timed as a run submits
 //! them, several in a row with one wait at the end; kernels are timed one by one with a wait
 //! after each, so their sum holds the waits and is above the whole.
-use crate::{args::BenchArgs, engine, screen::Screen};
+//!
+//! The semantic path (planes to class) is what the kernels that have to do with classes take more
+//! than in a map without classes; kernels are picked out of an iteration and submitted together.
+use crate::{
+    args::{BenchArgs, EngineArgs},
+    engine,
+    screen::Screen,
+};
 use anyhow::{Context, Result};
 use glam::DVec3;
 use mte_slam_core::{
     camera::Camera,
-    config::Config,
+    config::{Config, Head},
     device::{Batch, Device, Guidance, Rates},
     engine::Engine,
     field::FieldShape,
@@ -48,11 +55,50 @@ struct Measured {
     stages: Vec<Stage>,
 }
 
+/// Kernels on the way from the semantic planes to a class, with a head of either kind.
+const TO_CLASS: &[&str] =
+    &["composite", "decode_rays", "sample_features", "matrix_product", "sample_logits"];
+/// Those and what training adds. The per-sample head also scatters by `scatter_geometry`.
+const TRAINING: [&str; 9] = [
+    "composite",
+    "decode_rays",
+    "sample_features",
+    "matrix_product",
+    "sample_logits",
+    "scatter_surface",
+    "weight_gradient",
+    "reduce_partials",
+    "adam",
+];
+
+/// Time that classes take in a batch of rays.
+#[derive(Clone, Copy, Serialize)]
+struct ClassTime {
+    /// From planes to the class \[ms\].
+    to_class_ms: f64,
+    /// The same with all gradients and Adam \[ms\].
+    training_ms: f64,
+}
+
+/// The semantic path of both heads, in the same run.
+#[derive(Serialize)]
+struct SemanticPath {
+    rays: u32,
+    samples_a_ray: u32,
+    rounds: usize,
+    once_a_ray: ClassTime,
+    every_sample: ClassTime,
+    ratio_to_class: f64,
+    ratio_training: f64,
+}
+
 /// Which iteration.
 #[derive(Clone, Copy)]
 enum Kind {
     Tracking,
     Mapping,
+    /// The forward half of mapping.
+    Classes,
 }
 
 /// Measure.
@@ -62,11 +108,13 @@ pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
     let mut config = Config::preset("replica").context("there is no preset `replica`")?;
     (config.mapping.rays, config.tracking.render_rays) = (4000, 2000);
     (config.sampling.stratified, config.sampling.surface) = (32, 8);
-    let mut device = set_up(chosen.engine, &config)?;
+    let mut device = set_up(chosen.engine, &config, CLASSES)?;
     let tracking = measure(&mut device, &config, Kind::Tracking, args.iterations, screen)?;
     let mapping = measure(&mut device, &config, Kind::Mapping, args.iterations, screen)?;
     let (points, align_ms) = measure_align(&mut device, &config, args.iterations)?;
     let bytes = device.engine.allocated_bytes();
+    drop(device);
+    let semantic = measure_semantic_path(&config, &args.engine, args.iterations, screen)?;
 
     let mut text = format!(
         "{}\nbound {} x {} x {} m, three modalities of 16 channels, {CLASSES} classes, {} MiB of \
@@ -84,12 +132,36 @@ pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
         text,
         "\ntracking (align), {points} points: {align_ms:.2} ms an iteration, with reading back"
     );
+    let _ = writeln!(
+        text,
+        "\nsemantic path, {} x {}, {CLASSES} classes: what classes add, median of {} rounds\n  \
+         {:22}{:>12}{:>22}",
+        semantic.rays,
+        semantic.samples_a_ray,
+        semantic.rounds,
+        "head",
+        "to class",
+        "with gradients, Adam"
+    );
+    for (name, t) in
+        [("once a ray", semantic.once_a_ray), ("on every sample", semantic.every_sample)]
+    {
+        let _ = writeln!(text, "  {name:22}{:9.2} ms{:19.2} ms", t.to_class_ms, t.training_ms);
+    }
+    let _ = writeln!(
+        text,
+        "  {:22}{:>12}{:>22}",
+        "ratio",
+        format!("1 / {:.1}", 1.0 / semantic.ratio_to_class),
+        format!("1 / {:.1}", 1.0 / semantic.ratio_training)
+    );
     let json = serde_json::json!({
         "engine": chosen.record,
         "iterations": args.iterations,
         "device_bytes": bytes,
         "tracking_render": tracking,
         "mapping": mapping,
+        "semantic_path": semantic,
         "tracking_align": { "points": points, "ms_an_iteration": align_ms },
     });
     screen.result(&text, &format!("{json:#}\n"));
@@ -106,10 +178,10 @@ fn describe(text: &mut String, name: &str, m: &Measured) {
     }
 }
 
-fn set_up(engine: Engine, config: &Config) -> Result<Device> {
+fn set_up(engine: Engine, config: &Config, classes: u32) -> Result<Device> {
     let bounds = Bounds { min: SIZE_M * -0.5, max: SIZE_M * 0.5 };
     let shape = FieldShape::new(bounds, &config.field);
-    let mut device = Device::new(engine, config, CAMERA, DEPTH_UNIT_M, CLASSES, shape)
+    let mut device = Device::new(engine, config, CAMERA, DEPTH_UNIT_M, classes, shape)
         .context("the benchmark's map cannot be set up")?;
     let mut r = Recording::default();
     for k in 0..WINDOW {
@@ -126,6 +198,7 @@ fn box_frame(pose: &Pose) -> Frame {
     let half = SIZE_M * 0.45;
     let pixels = (0..CAMERA.height).flat_map(|v| (0..CAMERA.width).map(move |u| (u, v)));
     let mut frame = Frame {
+        features: None,
         index: 0,
         number: 0,
         time_s: 0.0,
@@ -166,6 +239,7 @@ fn record(
             let flags = FLAG_GUIDED | FLAG_POSE | FLAG_MAP;
             (WINDOW, config.mapping.rays, flags, &config.loss)
         }
+        Kind::Classes => (WINDOW, config.mapping.rays, FLAG_GUIDED, &config.loss),
     };
     let batch = Batch {
         frames,
@@ -179,6 +253,9 @@ fn record(
         guidance: Guidance::default(),
     };
     device.record_forward(r, &batch);
+    if let Kind::Classes = kind {
+        return (rays, s.stratified + s.surface);
+    }
     device.record_backward(r, &batch);
     let m = &config.mapping;
     device.record_pose_step(r, &batch, m.rate_translation_m, m.rate_rotation_rad, iteration == 0);
@@ -198,11 +275,11 @@ fn measure(
 ) -> Result<Measured> {
     let name = match kind {
         Kind::Tracking => "tracking",
-        Kind::Mapping => "mapping",
+        Kind::Mapping | Kind::Classes => "mapping",
     };
     let mut progress = screen.progress(name, 2 * iterations);
     let window: Vec<(u32, bool)> = (FIRST_SLOT..FIRST_SLOT + WINDOW)
-        .map(|slot| (slot, matches!(kind, Kind::Mapping) && slot == FIRST_SLOT))
+        .map(|slot| (slot, !matches!(kind, Kind::Tracking) && slot == FIRST_SLOT))
         .collect();
     let mut r = Recording::default();
     device.upload_window(&mut r, &window);
@@ -250,6 +327,82 @@ fn measure(
     }
     progress.finish();
     Ok(Measured { rays, samples_a_ray, ms_an_iteration, stages })
+}
+
+/// Three maps: without classes, with a head once a ray, with one on every sample.
+fn measure_semantic_path(
+    config: &Config,
+    engine: &EngineArgs,
+    iterations: usize,
+    screen: Screen,
+) -> Result<SemanticPath> {
+    // The per-sample head takes seconds a round on a processor.
+    let rounds = iterations.min(5);
+    let mut progress = screen.progress("semantic path", rounds);
+    let mut devices = Vec::new();
+    let (mut rays, mut samples_a_ray) = (0, 0);
+    for (classes, head) in [(0, Head::Ray), (CLASSES, Head::Ray), (CLASSES, Head::Sample)] {
+        let mut config = config.clone();
+        config.semantics.head = head;
+        let mut device = set_up(engine::start(engine)?.engine, &config, classes)?;
+        // A whole iteration compiles pipelines and fills the buffers that the parts read.
+        let mut r = Recording::default();
+        let window: Vec<_> = (FIRST_SLOT..FIRST_SLOT + WINDOW).map(|slot| (slot, true)).collect();
+        device.upload_window(&mut r, &window);
+        (rays, samples_a_ray) = record(&mut device, &config, Kind::Mapping, 0, &mut r);
+        device.engine.submit(&r)?;
+        block_on(device.engine.synchronise())?;
+        devices.push((device, config));
+    }
+    // Without classes, with each head; for training, without classes twice: each head is compared
+    // with the kernels that it uses.
+    let mut times: [Vec<f64>; 7] = Default::default();
+    let scattering = [TRAINING.as_slice(), &["scatter_geometry"]].concat();
+    let plan: [(usize, bool, &[&str]); 7] = [
+        (0, false, TO_CLASS),
+        (1, false, TO_CLASS),
+        (2, false, TO_CLASS),
+        (0, true, &TRAINING),
+        (1, true, &TRAINING),
+        (0, true, &scattering),
+        (2, true, &scattering),
+    ];
+    for round in 0..rounds {
+        for (times, (which, train, kernels)) in times.iter_mut().zip(&plan) {
+            let (device, config) = &mut devices[*which];
+            let mut r = Recording::default();
+            let kind = if *train { Kind::Mapping } else { Kind::Classes };
+            record(device, config, kind, round as u32 + 1, &mut r);
+            r.commands.retain(|command| match command {
+                Command::Dispatch { kernel, .. } => kernels.contains(&kernel.name),
+                _ => true,
+            });
+            let begin = Instant::now();
+            device.engine.submit(&r)?;
+            block_on(device.engine.synchronise())?;
+            times.push(ms_since(begin));
+        }
+        progress.set(round as u64 + 1, String::new);
+    }
+    progress.finish();
+    let median = times.map(|mut t| {
+        t.sort_by(f64::total_cmp);
+        t[t.len() / 2]
+    });
+    let time = |class: [usize; 2], training: [usize; 2]| ClassTime {
+        to_class_ms: (median[class[1]] - median[class[0]]).max(0.0),
+        training_ms: (median[training[1]] - median[training[0]]).max(0.0),
+    };
+    let (once_a_ray, every_sample) = (time([0, 1], [3, 4]), time([0, 2], [5, 6]));
+    Ok(SemanticPath {
+        rays,
+        samples_a_ray,
+        rounds,
+        once_a_ray,
+        every_sample,
+        ratio_to_class: once_a_ray.to_class_ms / every_sample.to_class_ms,
+        ratio_training: once_a_ray.training_ms / every_sample.training_ms,
+    })
 }
 
 /// One Gauss-Newton iteration against the field: sums of the normal equations, read back.

@@ -46,6 +46,7 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
         scale: record.scale,
         labels: args.labels.clone().unwrap_or_else(|| record.labels.clone()),
         truth_labels: args.truth_labels.clone(),
+        features: None,
         classes: ClassArgs {
             classes: args.classes.classes.clone().or(record.classes.clone()),
             unlabelled: args.classes.unlabelled.or(record.unlabelled),

@@ -2,7 +2,7 @@
 use crate::{
     args::MeshArgs,
     output::{folder::replace_file, meshes},
-    pipeline::{extract_mesh, restore},
+    pipeline::{extract_mesh, restore, shown_classes},
     screen::Screen,
 };
 use anyhow::Result;
@@ -12,7 +12,7 @@ pub fn run(args: &MeshArgs, screen: Screen) -> Result<()> {
     let mut slam = restore(&args.out, &args.engine, screen)?;
     let mesh = extract_mesh(&mut slam, args.resolution, screen)?;
     let mut names = Vec::new();
-    meshes::write(&mesh, &slam.info().classes, &mut |name, bytes| {
+    meshes::write(&mesh, &shown_classes(&slam), &mut |name, bytes| {
         names.push(args.out.join(name).display().to_string());
         replace_file(&args.out.join(name), bytes)
     })?;

@@ -2,7 +2,7 @@
 use crate::{
     args::RenderArgs,
     output::{folder::replace_file, trajectory::read_tum},
-    pipeline::{restore, write_view},
+    pipeline::{restore, shown_classes, write_view},
     screen::Screen,
 };
 use anyhow::{Context, Result, bail};
@@ -26,7 +26,7 @@ pub fn run(args: &RenderArgs, screen: Screen) -> Result<()> {
         views.push((format!("renders/{frame:06}"), estimate.world_from_camera));
     }
     let camera = slam.info().camera;
-    let classes = slam.info().classes.clone();
+    let classes = shown_classes(&slam);
     let mut names = Vec::new();
     let mut progress = screen.progress("rendering", views.len());
     for (i, (stem, pose)) in views.iter().enumerate() {

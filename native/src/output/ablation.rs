@@ -1,6 +1,6 @@
 //! `ablation.json` and `ablation.md`: what each of the semantic modules brings, over seeds.
 use super::metrics::{EngineRecord, SemanticFigures, SequenceRecord};
-use mte_slam_core::slam::ParameterCounts;
+use mte_slam_core::{config::Head, slam::ParameterCounts};
 use serde::{Deserialize, Serialize};
 use std::{collections::BTreeMap, fmt::Write};
 
@@ -31,6 +31,8 @@ pub struct RunKey {
     pub labels: String,
     /// Labels that classes are scored against.
     pub truth_labels: String,
+    /// Folder of feature maps.
+    pub features: Option<String>,
     /// Class list asked for.
     pub classes: Option<String>,
     /// Id asked to mean "no label".
@@ -105,6 +107,8 @@ pub struct FinishedRun {
     pub parameters: ParameterCounts,
     /// How many classes are thin and small, and below which share of the pixels \[%\].
     pub small_classes: (usize, f64),
+    /// Their names.
+    pub small_class_names: Vec<String>,
     /// What was assumed or met while reading and scoring.
     pub warnings: Vec<String>,
     /// Protocols of the figures.
@@ -143,15 +147,27 @@ impl OverSeeds {
     }
 }
 
-/// One row of the table.
+/// What a row switches.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct Variant {
     /// Its name.
     pub name: String,
     /// Multi-tier feature fusion.
     pub fusion: bool,
+    /// The fusion's local module.
+    pub local: bool,
     /// Feature redundancy suppressor.
     pub suppressor: bool,
+    /// What makes classes of features.
+    pub head: Head,
+}
+
+/// One row of the table.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// What it is.
+    #[serde(flatten)]
+    pub variant: Variant,
     /// Figures by name, their units in the name.
     pub figures: BTreeMap<&'static str, OverSeeds>,
     /// IoU \[%\] of each class that every seed has.
@@ -230,12 +246,7 @@ static MORE: [Figure; 3] = [
 
 impl Row {
     /// The runs of one row; `neither` are those of the row without modules, by the same seeds.
-    pub fn new(
-        name: &str,
-        (fusion, suppressor): (bool, bool),
-        runs: Vec<FinishedRun>,
-        neither: &[FinishedRun],
-    ) -> Row {
+    pub fn new(variant: Variant, runs: Vec<FinishedRun>, neither: &[FinishedRun]) -> Row {
         let mut figures = BTreeMap::new();
         for f in FIGURES.iter().chain(&MORE) {
             if let Some(over) = OverSeeds::of(runs.iter().map(f.of)) {
@@ -244,9 +255,8 @@ impl Row {
         }
         let gain = runs.iter().zip(neither);
         let gain = gain.map(|(a, b)| Some(a.classes.miou_percent - b.classes.miou_percent));
-        if (fusion || suppressor)
-            && let Some(over) = OverSeeds::of(gain)
-        {
+        let plain = !variant.fusion && !variant.suppressor && variant.head == Head::Ray;
+        if !plain && let Some(over) = OverSeeds::of(gain) {
             figures.insert("miou_gain_over_neither_points", over);
         }
         let over_input =
@@ -267,9 +277,7 @@ impl Row {
         let in_use = runs.iter().map(|r| r.parameters.anchors_in_use);
         parameters.anchors_in_use = in_use.max().unwrap_or(0);
         Row {
-            name: name.to_owned(),
-            fusion,
-            suppressor,
+            variant,
             figures,
             iou_percent_by_name,
             parameters,
@@ -298,7 +306,7 @@ pub struct Ablation {
     pub render_every: usize,
     /// The labels that the map learnt from, against the truth; none where they are the truth.
     pub input_labels: Option<ClassScores>,
-    /// neither, MTFF, FRS, both.
+    /// The rows asked for.
     pub rows: Vec<Row>,
     /// What the figures mean.
     pub protocols: BTreeMap<String, String>,
@@ -344,7 +352,7 @@ impl Ablation {
             lines.push(line);
         }
         for row in &self.rows {
-            let mut line = vec![row.name.clone()];
+            let mut line = vec![row.variant.name.clone()];
             line.extend(FIGURES.iter().map(|f| {
                 row.figures.get(f.key).map_or_else(dash, |o| o.text(f.decimals, f.factor))
             }));
@@ -360,7 +368,7 @@ impl Ablation {
                 over.map_or_else(dash, |o| o.text(2, 1.0))
             };
             let p = &row.parameters;
-            let mut line = vec![row.name.clone(), gain("miou_gain_over_neither_points")];
+            let mut line = vec![row.variant.name.clone(), gain("miou_gain_over_neither_points")];
             line.push(gain("miou_gain_over_input_labels_points"));
             let parts = [p.semantic_planes, p.semantic_decoder, p.class_head, p.fusion, p.anchors];
             line.extend(parts.iter().map(usize::to_string));
@@ -380,6 +388,7 @@ impl Ablation {
         ];
         text += "\nGains in points, and parameters by part:\n\n";
         text += &table(&head.map(str::to_owned), &lines);
+        text += &self.small_classes();
         text += "\n";
         for (what, protocol) in &self.protocols {
             let _ = writeln!(text, "- {what}: {protocol}");
@@ -388,6 +397,33 @@ impl Ablation {
             let _ = writeln!(text, "- note: {warning}");
         }
         text
+    }
+}
+
+impl Ablation {
+    /// The IoU of every thin and small class, a column each; nothing where there are none.
+    fn small_classes(&self) -> String {
+        let first = self.rows.iter().find_map(|r| r.runs.first());
+        let Some(names) = first.map(|r| &r.small_class_names).filter(|n| !n.is_empty()) else {
+            return String::new();
+        };
+        let mut head = vec!["row".to_owned()];
+        head.extend(names.iter().map(|n| format!("{n} %")));
+        let dash = || "-".to_owned();
+        let mut lines = Vec::new();
+        if let Some(input) = &self.input_labels {
+            let mut line = vec!["input labels".to_owned()];
+            let iou = |n: &String| input.iou_percent_by_name.get(n);
+            line.extend(names.iter().map(|n| iou(n).map_or_else(dash, |v| format!("{v:.1}"))));
+            lines.push(line);
+        }
+        for row in &self.rows {
+            let mut line = vec![row.variant.name.clone()];
+            let iou = |n: &String| row.iou_percent_by_name.get(n);
+            line.extend(names.iter().map(|n| iou(n).map_or_else(dash, |o| o.text(1, 1.0))));
+            lines.push(line);
+        }
+        format!("\nIoU of the thin and small classes:\n\n{}", table(&head, &lines))
     }
 }
 

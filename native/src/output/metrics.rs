@@ -199,6 +199,11 @@ impl SemanticFigures {
         }
     }
 
+    /// Names of the thin and small classes that have an IoU.
+    pub fn small_class_names(&self) -> Vec<String> {
+        self.classes.iter().filter(|c| c.small).map(|c| c.name.clone()).collect()
+    }
+
     /// Rows of the table, their names after `prefix`.
     fn rows(&self, prefix: &str) -> Vec<(String, String)> {
         let r = &self.report;

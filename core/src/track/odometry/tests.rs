@@ -140,6 +140,7 @@ fn a_blank_wall_leaves_three_directions_alone() {
 fn no_depth_is_a_typed_failure() {
     let c = camera();
     let empty = Frame {
+        features: None,
         index: 3,
         number: 3,
         time_s: 0.0,
