@@ -287,7 +287,10 @@ mod tests {
         let (_outer, inner) = folder();
         assert!(error(FolderSource::open(&inner.join("nowhere"))).contains("no such folder"));
         let e = error(FolderSource::open(&inner.join("b.txt")));
-        assert!(e.contains("b.txt") && e.contains("a folder with a recording, a .zip or a .sens"), "{e}");
+        assert!(
+            e.contains("b.txt") && e.contains("a folder with a recording, a .zip or a .sens"),
+            "{e}"
+        );
     }
 
     #[test]

@@ -59,4 +59,6 @@ mod bad_input_tests;
 #[cfg(test)]
 mod data_tests;
 #[cfg(test)]
+mod layout_tests;
+#[cfg(test)]
 mod test_support;

@@ -254,6 +254,7 @@ pub fn open(
 
     let name = folder.name();
     let last = name.trim_end_matches(['/', '\\']).rsplit(['/', '\\']).next().unwrap_or_default();
+    let last = last.strip_suffix(".sens").unwrap_or(last);
     let info = SequenceInfo {
         name: last.into(),
         layout: layout.name(),

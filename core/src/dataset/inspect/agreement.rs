@@ -97,9 +97,13 @@ impl PoseReading {
     fn cure(self) -> &'static str {
         match self {
             PoseReading::AsGiven => "",
-            PoseReading::FlippedAxes => "use --axes opengl, which turns them",
+            PoseReading::FlippedAxes => {
+                "turn them with --axes opengl (or leave it out where it is given)"
+            }
             PoseReading::Inverse => "invert them in the file",
-            PoseReading::InverseFlipped => "invert them in the file, and use --axes opengl",
+            PoseReading::InverseFlipped => {
+                "invert them in the file, and turn them with --axes opengl"
+            }
             PoseReading::ScalarFirst => "write them as x y z w",
             PoseReading::LexicalOrder => "write them in numeric order",
         }
@@ -333,7 +337,8 @@ impl Agreement {
     pub fn convincing(&self) -> Option<&Reading> {
         let best = self.alternatives.first()?;
         // A scale that is no known unit may explain it far better.
-        let better = self.is_convincing(best.error) && self.best_factor_error > CONVINCING * best.error;
+        let better =
+            self.is_convincing(best.error) && self.best_factor_error > CONVINCING * best.error;
         // Among nearly equal ones the fewest changes.
         let simple = |r: &&Reading| r.error < 1.15 * best.error;
         let changes = |r: &&Reading| usize::from(r.poses != PoseReading::AsGiven);
