@@ -151,7 +151,7 @@ fn packed_recordings_that_end_early_or_claim_too_much() {
         (codecs + 8, &65000u32.to_le_bytes(), "colour image size"),
         (codecs + 8, &48u32.to_le_bytes(), "colour image size"),
         (codecs + 16, &0u32.to_le_bytes(), "depth image size"),
-        (codecs + 16, &64u32.to_le_bytes(), "depth image size"),
+        (codecs + 16, &64u32.to_le_bytes(), "proportions of the depth image, 64x24"),
         (codecs + 24, &0f32.to_le_bytes(), "depth shift"),
         (codecs + 24, &f32::NAN.to_le_bytes(), "depth shift"),
         (count, &0u64.to_le_bytes(), "number of frames: found 0"),

@@ -51,7 +51,9 @@ impl Intrinsics {
     pub fn note_color(&self, color: [f64; 4], color_size: Size, warnings: &mut Vec<String>) {
         let Some(size) = self.size else { return };
         let [fx, fy, cx, cy] = color;
-        if !(fx > 0.0 && fy > 0.0 && color.iter().all(|x| x.is_finite())) {
+        let sides = [size.0, size.1, color_size.0, color_size.1];
+        let sensible = fx > 0.0 && fy > 0.0 && color.iter().all(|x| x.is_finite());
+        if !sensible || sides.contains(&0) {
             return;
         }
         let color = Camera { width: color_size.0, height: color_size.1, fx, fy, cx, cy };

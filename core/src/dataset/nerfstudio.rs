@@ -89,7 +89,7 @@ pub(super) fn read(folder: &Folder) -> Result<Entries, SequenceError> {
 }
 
 /// Frames by the numbers in the names of their files, and stamped.
-fn in_order(frames: &mut Vec<Entry>, warnings: &mut Vec<String>) {
+fn in_order(frames: &mut [Entry], warnings: &mut Vec<String>) {
     let numbers: Vec<Option<u64>> = frames.iter().map(|f| last_number(&f.color.file)).collect();
     let distinct: BTreeSet<u64> = numbers.iter().flatten().copied().collect();
     if distinct.len() == frames.len() {

@@ -1,6 +1,7 @@
 //! ScanNet's packed recordings (`.sens`, version 4). Only the frames' headers are read at opening;
 //! images are read one by one later, so that memory does not grow with the file.
 use super::{
+    decode::Origin,
     entries::{Entries, Entry},
     folder::{Folder, invalid},
     intrinsics::Intrinsics,
@@ -137,6 +138,9 @@ pub(super) fn read(folder: &Folder) -> Result<Entries, SequenceError> {
     };
     let color_size = (fields.u32(), fields.u32());
     let depth_size = (fields.u32(), fields.u32());
+    for (what, size) in [("colour image", color_size), ("depth image", depth_size)] {
+        Origin { file, frame: 0, what }.check_size(size, None)?;
+    }
     let depth_shift = f64::from(fields.f32());
     if !(depth_shift.is_finite() && depth_shift > 0.0) {
         return Err(cursor.error("depth shift", depth_shift, "units of depth per metre > 0"));

@@ -113,6 +113,7 @@ pub fn inspect(
                     poses fit each other cannot be said";
         add(Severity::Note, text.into());
     }
+    centre_remark(&info.camera, &mut add);
     depth.remark(&info, agreement.is_some(), &mut add);
     poses.remark(&mut add);
     order.remark(&mut add);
@@ -133,6 +134,20 @@ pub fn inspect(
         agreement,
         remarks,
     })
+}
+
+/// A camera of images of another size, such as of larger colour images, shows by its centre.
+fn centre_remark(c: &Camera, add: &mut impl FnMut(Severity, String)) {
+    let sides = [(c.cx, c.width), (c.cy, c.height)];
+    let whole = sides.map(|(centre, side)| (2.0 * centre + 1.0, f64::from(side)));
+    if whole.iter().any(|(twice, side)| !(0.75..=1.33).contains(&(twice / side))) {
+        let text = format!(
+            "the camera's centre, {:.1} {:.1}, is far from the middle of {}x{}: it seems to be that \
+             of images of about {:.0}x{:.0}; --camera takes that of the depth images",
+            c.cx, c.cy, c.width, c.height, whole[0].0, whole[1].0
+        );
+        add(Severity::Warning, text);
+    }
 }
 
 /// At most `wanted` of `0..frames`, evenly spread, with the first.

@@ -162,3 +162,14 @@ fn without_poses_only_the_range_speaks() {
         assert!(all.contains(part), "{all}");
     }
 }
+
+#[test]
+fn a_camera_of_larger_images_is_found() {
+    let mut room = Spoiled::new(20);
+    let c = &mut room.info.camera;
+    (c.fx, c.fy) = (2.0 * c.fx, 2.0 * c.fy);
+    (c.cx, c.cy) = (2.0 * c.cx + 0.5, 2.0 * c.cy + 0.5);
+    let found = room.inspect();
+    let text: String = found.remarks.iter().map(|r| r.text.as_str()).collect();
+    assert!(found.has_warnings() && text.contains("about 192x144"), "{:#?}", found.remarks);
+}
