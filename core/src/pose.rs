@@ -114,6 +114,14 @@ impl Pose {
         Pose { rotation: DMat3::from_quat(self.quaternion()), translation: self.translation }
     }
 
+    /// The same camera with y and z reversed: turns OpenGL's axes (y up, z backward) into ours (y
+    /// down, z forward), and back.
+    pub fn with_flipped_camera(&self) -> Pose {
+        let r = self.rotation;
+        let rotation = DMat3::from_cols(r.x_axis, -r.y_axis, -r.z_axis);
+        Pose { rotation, translation: self.translation }
+    }
+
     /// Whether every number is finite.
     pub fn is_finite(&self) -> bool {
         self.rotation.is_finite() && self.translation.is_finite()

@@ -3,7 +3,7 @@ use crate::{
     frame::{Frame, SequenceInfo},
     pose::Pose,
 };
-use alloc::{string::String, vec::Vec};
+use alloc::{format, string::String, vec::Vec};
 
 /// Why a recording could not be read. Every variant names the file (or the folder) it is about.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -67,6 +67,25 @@ pub trait Source {
     fn list(&self) -> Result<Vec<String>, SequenceError>;
     /// The bytes of one file.
     fn read(&self, file: &str) -> Result<Vec<u8>, SequenceError>;
+    /// The length of one file \[bytes\]. Reads all of it unless the source knows better.
+    fn size(&self, file: &str) -> Result<u64, SequenceError> {
+        Ok(self.read(file)?.len() as u64)
+    }
+    /// `bytes` bytes of one file from `offset` on; an error where it ends before. Reads all of it
+    /// unless the source knows better, as those of large files should.
+    fn read_range(&self, file: &str, offset: u64, bytes: usize) -> Result<Vec<u8>, SequenceError> {
+        let whole = self.read(file)?;
+        let part = usize::try_from(offset)
+            .ok()
+            .and_then(|first| whole.get(first..first.checked_add(bytes)?));
+        part.map(<[u8]>::to_vec).ok_or_else(|| too_short(file, whole.len() as u64, offset, bytes))
+    }
+}
+
+/// The error of a [`Source::read_range`] that goes past the end of a file of `size` bytes.
+pub fn too_short(file: &str, size: u64, offset: u64, bytes: usize) -> SequenceError {
+    let reason = format!("{size} bytes long, {bytes} bytes from {offset} on were expected");
+    SequenceError::Read { file: file.into(), reason }
 }
 
 /// An RGB-D sequence.
@@ -83,6 +102,10 @@ pub trait Sequence {
     fn truth(&self, index: usize) -> Option<Pose>;
     /// Time stamp of frame `index` \[s\] (the frame number where there are no stamps).
     fn time_s(&self, index: usize) -> f64;
+    /// The data set's own number of frame `index`, as in [`Frame::number`].
+    fn number(&self, index: usize) -> u64 {
+        index as u64
+    }
     /// What was assumed, skipped or masked while reading so far, for people; one sentence each.
     fn warnings(&self) -> Vec<String> {
         Vec::new()

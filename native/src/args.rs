@@ -1,5 +1,11 @@
 //! The command line as clap reads it. The texts here are the program's manual, so they teach:
 //! what a command does, what it writes, and an example to copy.
+mod recording;
+
+pub use recording::{
+    ClassArgs, ColorChoice, ConvertArgs, InspectArgs, SelectionArgs, SensorArgs, TargetLayout,
+};
+
 use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
 use glam::{DQuat, DVec3};
 use mte_slam_core::pose::Pose;
@@ -17,7 +23,9 @@ use std::path::PathBuf;
         classes where there are labels), pictures rendered from the map and metrics come out.\n\n\
         Start with the built-in sequence, which needs no data:\n\n    \
         mte-slam demo\n\n\
-        then with your own recording (Replica, TUM RGB-D or 7-Scenes layout):\n\n    \
+        then with your own recording (Replica, ScanNet, TUM RGB-D, 7-Scenes, nerfstudio, or a folder \
+        of images):\n\n    \
+        mte-slam inspect path/to/recording\n    \
         mte-slam run path/to/recording --out out/mine\n    \
         mte-slam mesh out/mine --resolution 0.01",
     after_help = "Exit codes: 0 done, 1 something failed while working, 2 the command line or \
@@ -49,8 +57,21 @@ pub enum Command {
     Demo(DemoArgs),
     /// Run SLAM on a recording and write trajectory, metrics, mesh and pictures
     #[command(
-        long_about = "Run SLAM on a recording. The layout is recognised by the files there: Replica \
-        (NICE-SLAM or vMAP render), TUM RGB-D, 7-Scenes.\n\n\
+        long_about = "Run SLAM on a recording: a folder, a .zip of one, or a .sens. The layout is \
+        recognised by the files:\n    \
+        replica        results/frame000000.jpg, results/depth000000.png, traj.txt (NICE-SLAM's render)\n    \
+        replica-vmap   rgb/rgb_0.png, depth/depth_0.png, traj.txt (vMAP's render)\n    \
+        tum            rgb.txt, depth.txt, groundtruth.txt\n    \
+        7scenes        frame-000000.color.png, .depth.png, .pose.txt\n    \
+        scannet        color/0.jpg, depth/0.png, pose/0.txt, intrinsic/, label-filt/ (exported)\n    \
+        sens           one .sens file (ScanNet, packed), label-filt/ beside it\n    \
+        nerfstudio     transforms.json with depth_file_path\n    \
+        images         color/ (rgb/, images/) and depth/ with any numbered names, 16-bit PNG depth in\n                   \
+        mm, and intrinsics.json, {\"fx\": .., \"fy\": .., \"cx\": .., \"cy\": ..} with, if wanted,\n                   \
+        w, h, depth_scale (units per metre), k1 k2 p1 p2 k3; or --camera instead of it.\n                   \
+        Poses, if any: pose/0.txt, or traj.txt or poses.txt with 16 numbers a line\n    \
+        ScanNet's raw label ids become NYU's 40 classes where scannetv2-labels.combined.tsv lies in the\n    \
+        folder or up to two above. `mte-slam inspect` says what is recognised and whether it fits.\n\n\
         The output folder receives:\n    \
         trajectory.txt       time stamp, position [m] and quaternion of world_from_camera (TUM format)\n    \
         trajectory_gt.txt    the same of the ground truth, where known\n    \
@@ -100,6 +121,27 @@ pub enum Command {
         Example:\n    mte-slam synth data/room --frames 200 && mte-slam run data/room"
     )]
     Synth(SynthArgs),
+    /// Say what a recording holds, and warn of the usual mistakes
+    #[command(
+        long_about = "Say what a recording holds: layout, frames, sizes, depth, poses, classes; and \
+        warn, with the evidence, of the usual mistakes. Frames are moved into later ones by the true \
+        poses, and the depth that arrives is compared with the depth measured there: under the \
+        given unit of depth and reading of the poses, and under other usual ones (1000, 5000, \
+        6553.5 units per metre; OpenGL's axes; inverse poses; quaternions with the scalar first; \
+        poses in lexical order).\n\n\
+        Examples:\n    mte-slam inspect data/room0\n    \
+        mte-slam inspect scene0000_00.sens --json\n    \
+        mte-slam inspect data/mine --camera \"525 525 319.5 239.5\" --depth-scale 5000"
+    )]
+    Inspect(InspectArgs),
+    /// Write a recording in another layout
+    #[command(
+        long_about = "Write a recording, as it is read (part, scale, camera, undistorted), in another \
+        layout. Labels go to semantic_class/ with a classes.json, which every layout may have here.\n\n\
+        Examples:\n    mte-slam convert scene0000_00.sens data/scene --to replica\n    \
+        mte-slam convert data/room0 data/room0-tum --to tum --frames 100"
+    )]
+    Convert(ConvertArgs),
     /// Serve the page and a recording, frame by frame, to a browser on this machine
     #[command(
         long_about = "Serve the page and a recording to a browser on this machine. The recording is \
@@ -219,8 +261,8 @@ pub struct OutputArgs {
 /// `run`.
 #[derive(Debug, Args)]
 pub struct RunArgs {
-    /// Folder of the recording.
-    #[arg(value_name = "DATASET", value_hint = ValueHint::DirPath)]
+    /// Folder, .zip or .sens of the recording.
+    #[arg(value_name = "DATASET", value_hint = ValueHint::AnyPath)]
     pub dataset: PathBuf,
     /// Which part of the recording, and how it is read.
     #[command(flatten)]
@@ -237,61 +279,6 @@ pub struct RunArgs {
     /// Output.
     #[command(flatten)]
     pub output: OutputArgs,
-}
-
-/// Which part of a recording, and how it is read.
-#[derive(Clone, Debug, Args)]
-pub struct SelectionArgs {
-    /// Layout of the files, instead of recognising it: replica, replica-vmap, tum, 7scenes.
-    #[arg(long, value_name = "LAYOUT", help_heading = "Recording")]
-    pub layout: Option<String>,
-    /// Take at most N frames [default: all].
-    #[arg(long, value_name = "N", value_parser = at_least_one, help_heading = "Recording")]
-    pub frames: Option<usize>,
-    /// Take every K-th frame.
-    #[arg(long, value_name = "K", default_value = "1", value_parser = at_least_one, help_heading = "Recording")]
-    pub stride: usize,
-    /// Skip the first I frames.
-    #[arg(long, value_name = "I", default_value_t = 0, help_heading = "Recording")]
-    pub start: usize,
-    /// Scale the images, for example 0.5 for half the width and height.
-    #[arg(long, value_name = "F", default_value = "1", value_parser = image_scale, help_heading = "Recording")]
-    pub scale: f64,
-    /// Labels: `none`, `dataset` (those of the recording, if any), or a folder of label images.
-    #[arg(
-        long,
-        value_name = "none|dataset|DIR",
-        default_value = "dataset",
-        help_heading = "Recording"
-    )]
-    pub labels: String,
-    /// Labels that rendered classes, and the labels of --labels themselves, are scored against;
-    /// classes are matched by their ids [default: the recording's own, if it has any, else those
-    /// of --labels].
-    #[arg(long, value_name = "dataset|DIR|none", help_heading = "Recording")]
-    pub truth_labels: Option<String>,
-    /// Folder of feature maps made of the colour images by any model, such as DINOv2: 000000.npy, ...
-    /// by frame number, float32 or float16, channels x height x width. The feature fusion reads
-    /// them in place of the labels (which it is still trained by).
-    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath, help_heading = "Recording")]
-    pub features: Option<PathBuf>,
-    /// What the labels and the truth are read with.
-    #[command(flatten)]
-    pub classes: ClassArgs,
-}
-
-/// What the ids in label images mean.
-#[derive(Clone, Debug, Default, Args)]
-pub struct ClassArgs {
-    /// Ids, names and colours of the classes: `nyu40` (ScanNet), `replica` (its 101 classes) or a
-    /// file like classes.json, `{"7": {"name": "bed", "color": [86, 117, 191]}}` [default: the
-    /// classes.json of the label folder or the recording, else every id that occurs].
-    #[arg(long, value_name = "nyu40|replica|FILE", help_heading = "Recording")]
-    pub classes: Option<String>,
-    /// Id in the label images that means "no label" [default: that of the class named void,
-    /// unlabelled or unlabeled; 0 for nyu40 and replica; else 255].
-    #[arg(long, value_name = "ID", help_heading = "Recording")]
-    pub unlabelled: Option<u16>,
 }
 
 /// `demo`.
@@ -418,8 +405,8 @@ pub struct SynthArgs {
 /// `serve`.
 #[derive(Debug, Args)]
 pub struct ServeArgs {
-    /// Folder of the recording.
-    #[arg(value_name = "DATASET", value_hint = ValueHint::DirPath)]
+    /// Folder, .zip or .sens of the recording.
+    #[arg(value_name = "DATASET", value_hint = ValueHint::AnyPath)]
     pub dataset: PathBuf,
     /// Port to listen at; 0 takes a free one.
     #[arg(long, value_name = "PORT", default_value_t = 8080)]
@@ -468,8 +455,8 @@ impl AblationRow {
 /// `ablate`.
 #[derive(Debug, Args)]
 pub struct AblateArgs {
-    /// Folder of the recording.
-    #[arg(value_name = "DATASET", value_hint = ValueHint::DirPath)]
+    /// Folder, .zip or .sens of the recording.
+    #[arg(value_name = "DATASET", value_hint = ValueHint::AnyPath)]
     pub dataset: PathBuf,
     /// Seeds 1 to N for each of the rows.
     #[arg(long, value_name = "N", default_value = "5", value_parser = at_least_one)]
@@ -560,12 +547,5 @@ fn positive_metres(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(m) if (0.001..=1.0).contains(&m) => Ok(m),
         _ => Err("expected metres from 0.001 to 1".to_owned()),
-    }
-}
-
-fn image_scale(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(f) if f.is_finite() && f > 0.0 && f <= 1.0 => Ok(f),
-        _ => Err("expected a factor above 0 and at most 1, for example 0.5".to_owned()),
     }
 }

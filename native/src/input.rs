@@ -7,15 +7,15 @@ use crate::{
     evaluation::MeshTruth,
     record::RunRecord,
     screen::Screen,
-    source::FolderSource,
+    source::{self, has_ending},
 };
 use anyhow::{Result, anyhow};
 use mte_slam_core::{
     classes::UNLABELLED,
-    dataset::{self, ClassList, LabelSource, Layout, OpenOptions},
+    dataset::{self, Axes, ClassList, LabelSource, Layout, OpenOptions},
     frame::SequenceInfo,
     mesh::Mesh,
-    sequence::Sequence,
+    sequence::{Sequence, Source},
     synth::{SyntheticMesh, SyntheticOptions, SyntheticSequence},
 };
 use std::path::{Path, PathBuf};
@@ -64,6 +64,9 @@ pub fn prepare(
         stride: selection.stride,
         frames: info.frames,
         scale: selection.scale,
+        camera: selection.sensor.camera.map(|c| c.numbers()),
+        depth_scale: selection.sensor.depth_scale,
+        axes: selection.sensor.axes.clone(),
         labels: selection.labels.clone(),
         truth_labels: class_truth.name.clone(),
         features: selection.features.as_ref().map(|f| f.display().to_string()),
@@ -78,24 +81,26 @@ pub fn prepare(
 fn preset_of_layout(layout: &str) -> &'static str {
     match layout {
         // 7-Scenes is what ScanNet is: a real room at 30 Hz by a structured-light sensor.
-        "7scenes" => "scannet",
+        "7scenes" | "scannet" | "sens" | "nerfstudio" | "images" => "scannet",
         "tum" => "tum",
         _ => "replica",
     }
 }
 
-/// The folder's own name, also of `.` and `data/room/`.
+/// The recording's own name, also of `.`, `data/room/` and `room.zip`.
 pub fn folder_name(path: &Path) -> String {
     let whole: PathBuf = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    whole.file_name().map_or("recording".to_owned(), |n| n.to_string_lossy().into_owned())
+    let packed = ["zip", "sens"].iter().any(|e| has_ending(&whole, e)) && whole.is_file();
+    let name = if packed { whole.file_stem() } else { whole.file_name() };
+    name.map_or("recording".to_owned(), |n| n.to_string_lossy().into_owned())
 }
 
 /// Open a recording.
 pub fn open(path: &Path, selection: &SelectionArgs, screen: Screen) -> Result<Box<dyn Sequence>> {
     let layout = selection.layout.as_deref().map(layout_named).transpose()?;
-    let source = FolderSource::open(path)?;
-    if let [first, ..] = source.skipped_links() {
-        let (name, n) = (path.display(), source.skipped_links().len());
+    let (source, skipped_links) = source::open(path)?;
+    if let [first, ..] = skipped_links.as_slice() {
+        let (name, n) = (path.display(), skipped_links.len());
         screen.note(&format!(
             "note: {name}: {n} links that lead out of it, such as {first}, are skipped"
         ));
@@ -111,7 +116,7 @@ pub fn open(path: &Path, selection: &SelectionArgs, screen: Screen) -> Result<Bo
 
 fn open_source(
     path: &Path,
-    source: FolderSource,
+    source: Box<dyn Source>,
     layout: Option<Layout>,
     labels: &str,
     features: Option<&Path>,
@@ -120,24 +125,36 @@ fn open_source(
     let labels = match labels {
         "none" => LabelSource::None,
         "dataset" => LabelSource::Dataset,
-        folder => LabelSource::Folder(Box::new(FolderSource::open(Path::new(folder))?)),
+        folder => LabelSource::Folder(source::open(Path::new(folder))?.0),
+    };
+    let axes = match selection.sensor.axes.as_deref() {
+        None => Axes::default(),
+        Some(name) => match Axes::named(name) {
+            Some(axes) => axes,
+            None => {
+                usage!("--axes: found `{name}`, expected one of {}", Axes::NAMES.join(", "))
+            }
+        },
     };
     let options = OpenOptions {
         layout,
+        camera: selection.sensor.camera,
+        depth_scale: selection.sensor.depth_scale,
+        axes,
         start: selection.start,
         stride: selection.stride,
         frames: selection.frames,
         scale: selection.scale,
         labels,
         features: match features {
-            Some(folder) => Some(Box::new(FolderSource::open(folder)?)),
+            Some(folder) => Some(source::open(folder)?.0),
             None => None,
         },
         classes: selection.classes.classes.as_deref().map(class_list).transpose()?,
         unlabelled_raw_id: selection.classes.unlabelled,
         ..OpenOptions::default()
     };
-    dataset::open(Box::new(source), options).map_err(|e| {
+    dataset::open(source, options).map_err(|e| {
         let (message, name) = (e.to_string(), path.display().to_string());
         // Errors about one file name it below the folder only.
         if message.contains(&name) { anyhow!(message) } else { anyhow!("{name}: {message}") }
@@ -176,7 +193,7 @@ pub fn open_truth(
         return Ok(ClassTruth::of_input(wanted, input));
     }
     let layout = selection.layout.as_deref().map(layout_named).transpose()?;
-    let truth = open_source(path, FolderSource::open(path)?, layout, wanted, None, selection)?;
+    let truth = open_source(path, source::open(path)?.0, layout, wanted, None, selection)?;
     if truth.info().classes.is_empty() {
         if chosen.is_some() {
             usage!("--truth-labels {wanted}: found no label images in the recording");

@@ -31,6 +31,8 @@ fn main() -> ExitCode {
         Command::Mesh(args) => commands::mesh::run(args, screen),
         Command::Render(args) => commands::render::run(args, screen),
         Command::Synth(args) => commands::synth::run(args, screen),
+        Command::Inspect(args) => commands::inspect::run(args, screen),
+        Command::Convert(args) => commands::convert::run(args, screen),
         Command::Serve(args) => commands::serve::run(args, screen),
         Command::Info(args) => commands::info::run(args, screen),
         Command::Ablate(args) => commands::ablate::run(args, screen),

@@ -27,6 +27,15 @@ pub struct RunRecord {
     pub frames: usize,
     /// Factor on the images' size.
     pub scale: f64,
+    /// The camera given in place of the recording's, if any: fx fy cx cy k1 k2 p1 p2 k3.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera: Option<Vec<f64>>,
+    /// Units of depth per metre given in place of the recording's, if any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub depth_scale: Option<f64>,
+    /// Axes of the true poses' cameras, if given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub axes: Option<String>,
     /// `none`, `dataset` or a folder.
     pub labels: String,
     /// Labels that classes were scored against: `none`, `dataset` or a folder.
@@ -64,6 +73,9 @@ impl Default for RunRecord {
             stride: 1,
             frames: 0,
             scale: 1.0,
+            camera: None,
+            depth_scale: None,
+            axes: None,
             labels: "dataset".to_owned(),
             truth_labels: "dataset".to_owned(),
             features: None,

@@ -1,8 +1,12 @@
-//! A folder on disk as a source of named bytes.
-use mte_slam_core::sequence::{SequenceError, Source};
+//! Folders, archives and packed recordings on disk as sources of named bytes.
+use mte_slam_core::{
+    dataset::ZipSource,
+    sequence::{SequenceError, Source, too_short},
+};
 use std::{
     collections::BTreeSet,
-    fs, io,
+    fs,
+    io::{self, BufReader, Read, Seek, SeekFrom},
     path::{Path, PathBuf},
 };
 
@@ -10,11 +14,46 @@ use std::{
 const MAX_FILES: usize = 2_000_000;
 /// Larger than any file of a recording that is read as a whole \[bytes\].
 const MAX_FILE_BYTES: u64 = 1 << 30;
-/// The one file that is also looked for beside the folder: Replica's scenes share it.
-const SHARED: &str = "cam_params.json";
+/// Files that are also looked for above the folder, because scenes share them: Replica's camera,
+/// ScanNet's table of labels.
+const SHARED: [&str; 3] = [
+    "../cam_params.json",
+    "../scannetv2-labels.combined.tsv",
+    "../../scannetv2-labels.combined.tsv",
+];
+/// What may belong to a packed recording beside it.
+const BESIDE_PACKED: [&str; 2] = ["label-filt/", "semantic_class/"];
+
+/// A recording on disk: a folder, a `.zip`, or a `.sens`.
+///
+/// # Errors
+/// [`SequenceError`] when it is none of them, or cannot be read.
+pub fn open(path: &Path) -> Result<(Box<dyn Source>, Vec<String>), SequenceError> {
+    if has_ending(path, "zip") && path.is_file() {
+        let failed = |e: io::Error| SequenceError::Read {
+            file: path.display().to_string(),
+            reason: explain(&e, "file"),
+        };
+        let file = fs::File::open(path).map_err(failed)?;
+        let name = path.display().to_string();
+        let archive = ZipSource::new(&name, BufReader::new(file), MAX_FILE_BYTES)?;
+        return Ok((Box::new(archive), Vec::new()));
+    }
+    let source = match has_ending(path, "sens") && path.is_file() {
+        true => FolderSource::around(path)?,
+        false => FolderSource::open(path)?,
+    };
+    let links = source.skipped_links().to_vec();
+    Ok((Box::new(source), links))
+}
+
+/// Whether a file's name ends so, in any case.
+pub fn has_ending(path: &Path, ending: &str) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
+}
 
 /// The files below a folder, listed once at opening. Links are followed only to files inside
-/// the folder; beside the folder itself only `../cam_params.json` can be read.
+/// the folder; outside of it only the few files can be read that scenes share.
 pub struct FolderSource {
     name: String,
     root: PathBuf,
@@ -34,19 +73,80 @@ impl FolderSource {
         let root = path.canonicalize().map_err(|e| failed(explain(&e, "folder")))?;
         let kind = fs::metadata(&root).map_err(|e| failed(explain(&e, "folder")))?;
         if !kind.is_dir() {
-            return Err(failed("a file, where a folder with a recording is expected".into()));
+            let expected = "a folder with a recording, a .zip or a .sens is expected";
+            return Err(failed(format!("a file, where {expected}")));
         }
         // "." says little in messages, and the name of a TUM folder tells its camera.
         let shown = if path.file_name().is_some() { path } else { &root };
         let name = shown.display().to_string();
         let mut source = Self { name, root, files: BTreeSet::new(), skipped_links: Vec::new() };
-        source.walk()?;
-        if let Some(above) = source.root.parent()
-            && fs::symlink_metadata(above.join(SHARED)).is_ok_and(|m| m.is_file())
-        {
-            source.files.insert(format!("../{SHARED}"));
-        }
+        source.walk(vec![String::new()])?;
+        source.add_shared();
         Ok(source)
+    }
+
+    /// A packed recording with the labels and lists beside it, and nothing else of its folder.
+    fn around(path: &Path) -> Result<Self, SequenceError> {
+        let failed =
+            |reason: String| SequenceError::Read { file: path.display().to_string(), reason };
+        let whole = path.canonicalize().map_err(|e| failed(explain(&e, "file")))?;
+        let (Some(root), Some(base)) = (whole.parent(), whole.file_name().and_then(|n| n.to_str()))
+        else {
+            return Err(failed("no name of a file in Unicode".into()));
+        };
+        let name = path.display().to_string();
+        let root = root.to_path_buf();
+        let mut source = Self { name, root, files: BTreeSet::new(), skipped_links: Vec::new() };
+        source.files.insert(base.into());
+        let shared = SHARED.iter().filter_map(|s| s.rsplit('/').next());
+        for name in shared.chain(["classes.json", "bound.json"]) {
+            if source.root.join(name).is_file() {
+                source.files.insert(name.into());
+            }
+        }
+        let there = BESIDE_PACKED.iter().filter(|f| source.root.join(f).is_dir());
+        source.walk(there.map(|f| (*f).to_owned()).collect())?;
+        source.add_shared();
+        Ok(source)
+    }
+
+    fn add_shared(&mut self) {
+        for name in SHARED {
+            let there = self.path_of(name);
+            if fs::symlink_metadata(there).is_ok_and(|m| m.is_file()) {
+                self.files.insert(name.into());
+            }
+        }
+    }
+
+    /// Where a listed file lies. The root has no links in it, so going up is going to its parent.
+    fn path_of(&self, file: &str) -> PathBuf {
+        let (mut folder, mut rest) = (self.root.as_path(), file);
+        while let Some(above) = rest.strip_prefix("../") {
+            (folder, rest) = (folder.parent().unwrap_or(folder), above);
+        }
+        folder.join(rest)
+    }
+
+    /// The path of a file that was listed, so that nothing in a file can lead out of the folder.
+    fn listed(&self, file: &str) -> Result<PathBuf, SequenceError> {
+        if self.files.contains(file) {
+            return Ok(self.path_of(file));
+        }
+        let is_link = self.skipped_links.iter().any(|l| {
+            file.strip_prefix(l.as_str()).is_some_and(|r| r.is_empty() || r.starts_with('/'))
+        });
+        Err(self.failed(
+            file,
+            match is_link {
+                true => "behind a link that leads out of the folder; copy or mount it".into(),
+                false => "no such file when the folder was listed".into(),
+            },
+        ))
+    }
+
+    fn failed(&self, file: &str, reason: String) -> SequenceError {
+        SequenceError::Read { file: format!("{}/{file}", self.name), reason }
     }
 
     /// Links that were not followed, because they lead out of the folder, nowhere, or to a
@@ -55,8 +155,8 @@ impl FolderSource {
         &self.skipped_links
     }
 
-    fn walk(&mut self) -> Result<(), SequenceError> {
-        let mut folders = vec![String::new()];
+    /// Lists what is below some folders, each empty or with a final '/'.
+    fn walk(&mut self, mut folders: Vec<String>) -> Result<(), SequenceError> {
         while let Some(folder) = folders.pop() {
             let failed = |e: io::Error| SequenceError::Read {
                 file: format!("{}/{folder}", self.name),
@@ -103,27 +203,31 @@ impl Source for FolderSource {
     }
 
     fn read(&self, file: &str) -> Result<Vec<u8>, SequenceError> {
-        let failed =
-            |reason: String| SequenceError::Read { file: format!("{}/{file}", self.name), reason };
-        // Only names that were listed, so that nothing in a file can lead out of the folder.
-        if !self.files.contains(file) {
-            let is_link = self.skipped_links.iter().any(|l| {
-                file.strip_prefix(l.as_str()).is_some_and(|r| r.is_empty() || r.starts_with('/'))
-            });
-            return Err(failed(match is_link {
-                true => "behind a link that leads out of the folder; copy or mount it".into(),
-                false => "no such file when the folder was listed".into(),
-            }));
-        }
-        let path = match file.strip_prefix("../") {
-            Some(above) => self.root.parent().unwrap_or(&self.root).join(above),
-            None => self.root.join(file),
-        };
-        let size = fs::metadata(&path).map_err(|e| failed(explain(&e, "file")))?.len();
+        let path = self.listed(file)?;
+        let size = self.size(file)?;
         if size > MAX_FILE_BYTES {
-            return Err(failed(format!("{size} bytes, expected at most {MAX_FILE_BYTES}")));
+            let reason = format!("{size} bytes, expected at most {MAX_FILE_BYTES}");
+            return Err(self.failed(file, reason));
         }
-        fs::read(&path).map_err(|e| failed(explain(&e, "file")))
+        fs::read(&path).map_err(|e| self.failed(file, explain(&e, "file")))
+    }
+
+    fn size(&self, file: &str) -> Result<u64, SequenceError> {
+        let found = fs::metadata(self.listed(file)?);
+        Ok(found.map_err(|e| self.failed(file, explain(&e, "file")))?.len())
+    }
+
+    fn read_range(&self, file: &str, offset: u64, bytes: usize) -> Result<Vec<u8>, SequenceError> {
+        let failed = |e: io::Error| self.failed(file, explain(&e, "file"));
+        let size = self.size(file)?;
+        if offset.checked_add(bytes as u64).is_none_or(|end| end > size) {
+            return Err(too_short(&format!("{}/{file}", self.name), size, offset, bytes));
+        }
+        let mut opened = fs::File::open(self.listed(file)?).map_err(failed)?;
+        opened.seek(SeekFrom::Start(offset)).map_err(failed)?;
+        let mut part = vec![0; bytes];
+        opened.read_exact(&mut part).map_err(failed)?;
+        Ok(part)
     }
 }
 
@@ -165,9 +269,15 @@ mod tests {
         for outside in ["../secret.txt", "/etc/hostname", "results/../b.txt", "nothing"] {
             assert!(error(source.read(outside)).contains(outside), "{outside}");
         }
-        fs::write(outer.path().join(SHARED), "{}").unwrap();
+        for name in ["cam_params.json", "scannetv2-labels.combined.tsv"] {
+            fs::write(outer.path().join(name), "{}").unwrap();
+            let source = FolderSource::open(&inner).unwrap();
+            assert_eq!(source.read(&format!("../{name}")).unwrap(), b"{}");
+        }
+        let source = FolderSource::open(&inner.join("results")).unwrap();
+        assert_eq!(source.read("../../scannetv2-labels.combined.tsv").unwrap(), b"{}");
+        assert!(error(source.read("../../cam_params.json")).contains("no such file"));
         let source = FolderSource::open(&inner).unwrap();
-        assert_eq!(source.read("../cam_params.json").unwrap(), b"{}");
         fs::remove_file(inner.join("b.txt")).unwrap();
         assert!(error(source.read("b.txt")).contains("no such file"));
     }
@@ -177,7 +287,29 @@ mod tests {
         let (_outer, inner) = folder();
         assert!(error(FolderSource::open(&inner.join("nowhere"))).contains("no such folder"));
         let e = error(FolderSource::open(&inner.join("b.txt")));
-        assert!(e.contains("b.txt") && e.contains("a folder with a recording is expected"), "{e}");
+        assert!(
+            e.contains("b.txt") && e.contains("a folder with a recording, a .zip or a .sens"),
+            "{e}"
+        );
+    }
+
+    #[test]
+    fn parts_of_files_and_packed_recordings() {
+        let (_outer, inner) = folder();
+        fs::write(inner.join("scene.sens"), "0123456789").unwrap();
+        fs::write(inner.join("classes.json"), "{}").unwrap();
+        fs::create_dir(inner.join("label-filt")).unwrap();
+        fs::write(inner.join("label-filt/0.png"), "x").unwrap();
+        let (source, _) = open(&inner.join("scene.sens")).unwrap();
+        assert_eq!(source.list().unwrap(), ["classes.json", "label-filt/0.png", "scene.sens"]);
+        assert_eq!(source.size("scene.sens").unwrap(), 10);
+        assert_eq!(source.read_range("scene.sens", 3, 4).unwrap(), b"3456");
+        assert!(error(source.read_range("scene.sens", 8, 3)).contains("10 bytes long"));
+        assert!(error(source.read_range("scene.sens", u64::MAX, 3)).contains("10 bytes long"));
+        assert!(error(source.read("b.txt")).contains("no such file"));
+        fs::write(inner.join("x.zip"), "PK").unwrap();
+        assert!(error(open(&inner.join("x.zip")).map(drop)).contains("a zip archive"));
+        assert!(error(open(&inner.join("y.zip")).map(drop)).contains("no such folder"));
     }
 
     #[cfg(unix)]

@@ -718,9 +718,10 @@ fn frames_without_depth_or_pose_do_not_stop_a_run() {
 fn help_and_information_work_without_anything() {
     let folder = tempfile::tempdir().unwrap();
     let f = folder.path();
-    for command in
-        ["demo", "run", "eval", "ablate", "mesh", "render", "synth", "info", "bench", "shaders"]
-    {
+    for command in [
+        "demo", "run", "eval", "ablate", "mesh", "render", "synth", "inspect", "convert", "info",
+        "bench", "shaders",
+    ] {
         let help = text(&succeed(f, &[command, "--help"]).stdout);
         assert!(help.contains("Usage:"), "{help}");
     }

@@ -80,9 +80,17 @@ fn all_layouts_deliver_the_same_in_numeric_order() {
             assert_eq!(got.labels, want.labels, "{layout} {i}");
             assert_eq!(got.number, i as u64);
             assert_eq!(got.depth[..200], want.depth[..200], "{layout} {i}");
-            let off = got.truth.unwrap().translation - want.truth.unwrap().translation;
-            assert!(off.length() < 1e-9, "{layout} {i}");
+            // A .sens file has single precision.
+            let tolerance = if layout == Layout::Sens { 1e-6 } else { 1e-9 };
+            let off = got.truth.unwrap().compose(&want.truth.unwrap().inverse());
+            assert!(off.translation.length() < tolerance, "{layout} {i}");
+            assert!(off.angle_rad() < 1e-6, "{layout} {i}");
         }
+        let (got, want) = (s.info().camera, info().camera);
+        assert_eq!((got.width, got.height, got.fx), (want.width, want.height, want.fx), "{layout}");
+        assert!((got.cx - want.cx).hypot(got.cy - want.cy) < 1e-9, "{layout}");
+        let unit = s.info().depth_unit_m / info().depth_unit_m;
+        assert!((unit - 1.0).abs() < 1e-6, "{layout}");
         if layout == Layout::Tum {
             assert!((s.time_s(3) - 100.1).abs() < 1e-9);
         }
@@ -404,56 +412,6 @@ fn distorted_tum_images_are_straightened() {
     assert_eq!(f.labels.unwrap(), vec![1; c.pixels()]);
     m.insert("camera.txt", "50 50 31.5 23.5  5 5 0 0 0");
     assert_has(&error_of(&m, OpenOptions::default()), &["camera.txt", "lens distortion"]);
-}
-
-/// A small generator, so that the same damage is done each time.
-struct Pcg(u64);
-
-impl Pcg {
-    fn below(&mut self, n: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        ((self.0 >> 33) as usize) % n.max(1)
-    }
-}
-
-#[test]
-fn random_damage_never_panics() {
-    let mut rng = Pcg(2024);
-    let (mut good, mut bad) = (0, 0);
-    for layout in Layout::ALL {
-        let whole = renamed(2, layout);
-        let names: Vec<String> = whole.names().map(String::from).collect();
-        for _ in 0..250 {
-            let mut m = whole.clone();
-            for _ in 0..=rng.below(2) {
-                let name = &names[rng.below(names.len())];
-                let mut bytes = m.remove(name).unwrap_or_default();
-                match rng.below(6) {
-                    0 => continue,
-                    1 => bytes.truncate(rng.below(bytes.len())),
-                    2 => bytes.insert(rng.below(bytes.len()), rng.below(256) as u8),
-                    3 => bytes.extend_from_slice(b"-9e999 \xfe {"),
-                    _ => {
-                        for _ in 0..=rng.below(4) {
-                            let at = rng.below(bytes.len());
-                            if let Some(b) = bytes.get_mut(at) {
-                                *b ^= 1 << rng.below(8);
-                            }
-                        }
-                    }
-                }
-                m.insert(name.clone(), bytes);
-            }
-            let scale = [1.0, 0.5, 0.7][rng.below(3)];
-            let read = open(Box::new(m), OpenOptions { scale, ..Default::default() })
-                .and_then(|mut s| (0..s.info().frames).try_for_each(|i| s.frame(i).map(drop)));
-            match read {
-                Ok(()) => good += 1,
-                Err(_) => bad += 1,
-            }
-        }
-    }
-    assert!(good > 50 && bad > 500, "{good} read, {bad} refused");
 }
 
 #[test]

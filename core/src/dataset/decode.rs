@@ -7,6 +7,8 @@ use std::io::Cursor;
 
 /// Widest and highest image that is read \[pixels\].
 pub const MAX_SIDE: u32 = 16384;
+/// Most pixels of an image that is read: 8192 x 8192, so that no file makes us take gigabytes.
+pub const MAX_PIXELS: u64 = 1 << 26;
 /// Most bytes a decoder may allocate.
 const MAX_BYTES: usize = 768 << 20;
 
@@ -23,16 +25,25 @@ pub(super) struct Origin<'a> {
 }
 
 impl Origin<'_> {
-    fn error(&self, found: impl Into<String>, expected: impl Into<String>) -> SequenceError {
+    pub(super) fn error(
+        &self,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> SequenceError {
         invalid(self.file, Some(self.frame), self.what, found, expected)
     }
 
-    fn check_size(&self, size: Size, expected: Option<Size>) -> Result<(), SequenceError> {
+    pub(super) fn check_size(
+        &self,
+        size: Size,
+        expected: Option<Size>,
+    ) -> Result<(), SequenceError> {
         let (w, h) = size;
         let field = format!("{} size", self.what);
         let found = format!("{w}x{h}");
-        if w == 0 || h == 0 || w > MAX_SIDE || h > MAX_SIDE {
-            let limits = format!("1x1 to {MAX_SIDE}x{MAX_SIDE}");
+        let pixels = u64::from(w) * u64::from(h);
+        if pixels == 0 || w > MAX_SIDE || h > MAX_SIDE || pixels > MAX_PIXELS {
+            let limits = format!("1x1 to {MAX_SIDE}x{MAX_SIDE}, and at most {MAX_PIXELS} pixels");
             return Err(invalid(self.file, Some(self.frame), field, found, limits));
         }
         match expected {

@@ -3,6 +3,7 @@ use super::{
     folder::{Folder, invalid, parse_matrix, plural},
     intrinsics::{self, Intrinsics},
     layout::{COLOR_ENDS, Layout, SEVEN_COLOR_ENDS},
+    stored::Stored,
 };
 use crate::{frame::Bounds, pose::Pose, sequence::SequenceError};
 use glam::DVec3;
@@ -13,10 +14,32 @@ use std::collections::BTreeMap;
 pub(super) struct Entry {
     pub number: u64,
     pub time_s: f64,
-    pub color: String,
-    pub depth: String,
+    pub color: Stored,
+    pub depth: Stored,
     pub label: Option<String>,
     pub truth: Option<Pose>,
+}
+
+impl Entry {
+    /// A frame whose images are files of their own, and that has no time stamp.
+    pub fn of_files(number: u64, color: String, depth: String, truth: Option<Pose>) -> Entry {
+        let (color, depth) = (color.into(), depth.into());
+        Entry { number, time_s: number as f64, color, depth, label: None, truth }
+    }
+}
+
+/// The depth image that belongs to a colour image, or an error that says how it would be called.
+pub(super) fn depth_of(
+    depths: &BTreeMap<u64, String>,
+    number: u64,
+    color: &str,
+    start: &str,
+) -> Result<String, SequenceError> {
+    let example = depths.values().next().map_or(start, String::as_str);
+    depths.get(&number).cloned().ok_or_else(|| SequenceError::Read {
+        file: format!("{start}{number}.png"),
+        reason: format!("missing: {color} has no depth image (they look like {example})"),
+    })
 }
 
 /// A recording before its images are decoded.
@@ -31,7 +54,11 @@ pub(super) struct Entries {
 }
 
 /// Reads everything but the images.
-pub(super) fn read(folder: &Folder, layout: Layout) -> Result<Entries, SequenceError> {
+pub(super) fn read(
+    folder: &Folder,
+    layout: Layout,
+    given: Option<Intrinsics>,
+) -> Result<Entries, SequenceError> {
     let mut entries = match layout {
         Layout::ReplicaNice => replica(
             folder,
@@ -49,7 +76,15 @@ pub(super) fn read(folder: &Folder, layout: Layout) -> Result<Entries, SequenceE
         )?,
         Layout::Tum => super::tum::read(folder)?,
         Layout::SevenScenes => seven_scenes(folder)?,
+        Layout::ScanNet => super::scannet::read(folder)?,
+        Layout::Sens => super::sens::read(folder)?,
+        Layout::Nerfstudio => super::nerfstudio::read(folder)?,
+        Layout::Images => super::images::read(folder, given.clone())?,
     };
+    if let Some(given) = given {
+        let depth_scale = entries.intrinsics.depth_scale;
+        entries.intrinsics = Intrinsics { depth_scale, ..given };
+    }
     if let Some(scale) = entries.intrinsics.depth_scale {
         entries.depth_unit_m = 1.0 / scale;
     }
@@ -82,14 +117,10 @@ fn replica(
             vec![None; numbers.len()]
         }
     };
-    let example = depths.values().next().cloned().unwrap_or_else(|| depth_start.into());
     let mut frames = Vec::with_capacity(numbers.len());
     for ((number, color), truth) in colors.into_iter().zip(poses) {
-        let depth = depths.get(&number).cloned().ok_or_else(|| SequenceError::Read {
-            file: depth_start.to_string() + &format!("{number}.png"),
-            reason: format!("missing: {color} has no depth image (they look like {example})"),
-        })?;
-        frames.push(Entry { number, time_s: number as f64, color, depth, label: None, truth });
+        let depth = depth_of(&depths, number, &color, depth_start)?;
+        frames.push(Entry::of_files(number, color, depth, truth));
     }
     let surplus = depths.len() - frames.len();
     if surplus > 0 {
@@ -107,7 +138,7 @@ fn replica(
 
 /// One pose a line. As many lines as images: line i belongs to the i-th image. More lines (when
 /// only some of the images were kept): line n belongs to image number n.
-fn trajectory(
+pub(super) fn trajectory(
     folder: &Folder,
     file: &str,
     numbers: &[u64],
@@ -149,7 +180,7 @@ fn seven_scenes(folder: &Folder) -> Result<Entries, SequenceError> {
             Some(file) => parse_matrix(file, Some(number), &folder.text(file)?)?,
             None => None,
         };
-        frames.push(Entry { number, time_s: number as f64, color, depth, label: None, truth });
+        frames.push(Entry::of_files(number, color, depth, truth));
     }
     let intrinsics = intrinsics::read(folder)?.unwrap_or_else(|| {
         warnings.push("no camera-intrinsics.txt: f 585, centre 320 240 taken".into());

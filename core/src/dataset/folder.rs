@@ -22,6 +22,12 @@ pub(super) fn invalid(
     }
 }
 
+/// More text than any recording has: a million poses of 16 numbers \[bytes\].
+const MAX_TEXT_BYTES: usize = 400 << 20;
+
+/// Files beside scenes that belong to all of them.
+const SHARED: [&str; 2] = ["cam_params.json", "scannetv2-labels.combined.tsv"];
+
 /// A source with its list of names, seen from the folder in which the recording lies.
 pub(super) struct Folder {
     source: Box<dyn Source>,
@@ -40,14 +46,15 @@ impl Folder {
         Ok(Self { source, prefix: String::new(), all, names })
     }
 
-    /// When every file lies in one sub-folder (an unpacked archive often looks so), go there.
-    /// Returns whether it did.
+    /// When every file lies in one sub-folder (an unpacked archive often looks so), but for those
+    /// that scenes share, go there. Returns whether it did.
     pub fn descend(&mut self) -> bool {
-        let Some((top, _)) = self.names.first().and_then(|n| n.split_once('/')) else {
+        let own = || self.names.iter().filter(|n| !SHARED.contains(&n.as_str()));
+        let Some((top, _)) = own().next().and_then(|n| n.split_once('/')) else {
             return false;
         };
         let top = format!("{top}/");
-        if !self.names.iter().all(|n| n.starts_with(&top)) {
+        if !own().all(|n| n.starts_with(&top)) {
             return false;
         }
         self.names =
@@ -74,27 +81,33 @@ impl Folder {
         self.names.contains(name)
     }
 
-    /// `name` here, or one folder up where the source lets us see it.
+    /// `name` here, or one or two folders up where the source lets us see it.
     pub fn here_or_above(&self, name: &str) -> Option<String> {
         if self.has(name) {
             return Some(name.into());
         }
-        let above = match self.prefix.strip_suffix('/') {
-            None => format!("../{name}"),
-            Some(inner) => match inner.rsplit_once('/') {
-                Some((outer, _)) => format!("{outer}/{name}"),
-                None => name.into(),
-            },
-        };
-        // A leading '/' marks a name that is relative to the source and not to the recording.
-        self.all.contains(&above).then(|| format!("/{above}"))
+        // Folders of the recording inside the source, the innermost first; then those outside.
+        let mut inside: Vec<&str> = self.prefix.split_terminator('/').collect();
+        let mut outside = String::new();
+        for _ in 0..2 {
+            if inside.pop().is_none() {
+                outside += "../";
+            }
+            let folder: String = inside.iter().map(|part| format!("{part}/")).collect();
+            let above = format!("{outside}{folder}{name}");
+            if self.all.contains(&above) {
+                // The '/' in front marks a name relative to the source, not to the recording.
+                return Some(format!("/{above}"));
+            }
+        }
+        None
     }
 
-    /// The bytes of a file.
-    pub fn read(&self, name: &str) -> Result<Vec<u8>, SequenceError> {
+    /// The name that the source knows a file by.
+    fn in_source(&self, name: &str) -> Result<String, SequenceError> {
         match name.strip_prefix('/') {
-            Some(of_source) => self.source.read(of_source),
-            None if self.has(name) => self.source.read(&format!("{}{name}", self.prefix)),
+            Some(of_source) => Ok(of_source.into()),
+            None if self.has(name) => Ok(format!("{}{name}", self.prefix)),
             None => Err(SequenceError::Read {
                 file: name.into(),
                 reason: format!("no such file in {}", self.name()),
@@ -102,9 +115,34 @@ impl Folder {
         }
     }
 
+    /// The bytes of a file.
+    pub fn read(&self, name: &str) -> Result<Vec<u8>, SequenceError> {
+        self.source.read(&self.in_source(name)?)
+    }
+
+    /// The length of a file \[bytes\].
+    pub fn size(&self, name: &str) -> Result<u64, SequenceError> {
+        self.source.size(&self.in_source(name)?)
+    }
+
+    /// Some of the bytes of a file.
+    pub fn read_range(
+        &self,
+        name: &str,
+        offset: u64,
+        bytes: usize,
+    ) -> Result<Vec<u8>, SequenceError> {
+        self.source.read_range(&self.in_source(name)?, offset, bytes)
+    }
+
     /// A text file, without a byte order mark.
     pub fn text(&self, name: &str) -> Result<String, SequenceError> {
-        let text = String::from_utf8(self.read(name)?).map_err(|e| {
+        let bytes = self.read(name)?;
+        if bytes.len() > MAX_TEXT_BYTES {
+            let (found, limit) = (format!("{} bytes", bytes.len()), MAX_TEXT_BYTES);
+            return Err(invalid(name, None, "text", found, format!("at most {limit} bytes")));
+        }
+        let text = String::from_utf8(bytes).map_err(|e| {
             let at = e.utf8_error().valid_up_to();
             invalid(name, None, "text", format!("no UTF-8 at byte {at}"), "UTF-8 text")
         })?;
@@ -240,9 +278,20 @@ mod tests {
         assert_eq!(f.read("a.txt").unwrap(), b"x/y/a.txt");
         assert_eq!(f.name(), "m/x/y");
 
-        let f = folder(&["../cam.json", "a"]);
-        let above = f.here_or_above("cam.json").unwrap();
-        assert_eq!(f.text(&above).unwrap(), "../cam.json");
+        assert_eq!(f.here_or_above("cam.json"), None);
+        for above in ["x/cam.json", "cam.json"] {
+            let mut f = folder(&["x/y/a.txt", above]);
+            f.prefix = "x/y/".into();
+            f.names.remove(above);
+            let found = f.here_or_above("cam.json").unwrap();
+            assert_eq!(f.text(&found).unwrap(), above);
+        }
+
+        let f = folder(&["../cam.json", "../../table.tsv", "a"]);
+        for name in ["cam.json", "table.tsv"] {
+            let above = f.here_or_above(name).unwrap();
+            assert!(f.text(&above).unwrap().ends_with(name));
+        }
         assert_eq!(f.names().collect::<Vec<_>>(), ["a"]);
         assert!(f.read("../cam.json").is_err() && f.read("../../etc/passwd").is_err());
     }

@@ -2,6 +2,7 @@
 use super::{
     decode::Size,
     folder::{Folder, invalid, parse_numbers},
+    resize::{Resize, same_aspect},
 };
 use crate::{camera::Camera, sequence::SequenceError};
 
@@ -19,17 +20,79 @@ pub(super) struct Intrinsics {
     pub distortion: Distortion,
     /// Units of depth per metre, when the file says so.
     pub depth_scale: Option<f64>,
+    /// Whether it is also the camera of images of the same proportions in another size, as where
+    /// the file is about colour and depth is smaller.
+    pub scales: bool,
 }
+
+/// Pixels by which colour may lie beside depth before it is said.
+const MAX_SHIFT_PIXELS: f64 = 1.0;
 
 impl Intrinsics {
     /// A default without distortion, valid for one size.
     pub fn fixed(from: &str, size: Size, focal_centre: [f64; 4]) -> Self {
-        let distortion = [0.0; 5];
-        Self { from: from.into(), size: Some(size), focal_centre, distortion, depth_scale: None }
+        Self { size: Some(size), ..Self::any_size(from, focal_centre) }
+    }
+
+    /// Without distortion, of images of any size.
+    pub fn any_size(from: &str, focal_centre: [f64; 4]) -> Self {
+        Self {
+            from: from.into(),
+            size: None,
+            focal_centre,
+            distortion: [0.0; 5],
+            depth_scale: None,
+            scales: false,
+        }
+    }
+
+    /// Compares the colour camera's numbers with these, the depth camera's. Colour is only
+    /// stretched to the size of depth, so a difference is worth a warning.
+    pub fn note_color(&self, color: [f64; 4], color_size: Size, warnings: &mut Vec<String>) {
+        let Some(size) = self.size else { return };
+        let [fx, fy, cx, cy] = color;
+        let sides = [size.0, size.1, color_size.0, color_size.1];
+        let sensible = fx > 0.0 && fy > 0.0 && color.iter().all(|x| x.is_finite());
+        if !sensible || sides.contains(&0) {
+            return;
+        }
+        let color = Camera { width: color_size.0, height: color_size.1, fx, fy, cx, cy };
+        let fitted = Resize::to_size(color_size, size).camera(&color);
+        let [fx, fy, cx, cy] = self.focal_centre;
+        let depth = Camera { width: size.0, height: size.1, fx, fy, cx, cy };
+        // A far point on each corner's ray of the depth camera, in both images.
+        let (right, bottom) = (f64::from(size.0 - 1), f64::from(size.1 - 1));
+        let shift = [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)]
+            .into_iter()
+            .filter_map(|(u, v)| {
+                let other = fitted.project(depth.back_project(u, v, 1.0))?;
+                Some((other.x - u).hypot(other.y - v))
+            })
+            .fold(0.0, f64::max);
+        if shift > MAX_SHIFT_PIXELS {
+            warnings.push(format!(
+                "by their intrinsics colour, stretched to the size of depth, lies up to \
+                 {shift:.1} pixels beside it"
+            ));
+        }
     }
 
     /// The camera of images of the given size, or an error when it belongs to another size.
     pub fn camera(&self, depth_file: &str, size: Size) -> Result<Camera, SequenceError> {
+        let [fx, fy, cx, cy] = self.focal_centre;
+        if let Some((width, height)) = self.size.filter(|s| *s != size && self.scales) {
+            if !same_aspect((width, height), size) {
+                return Err(invalid(
+                    depth_file,
+                    None,
+                    "depth image size",
+                    format!("{}x{}", size.0, size.1),
+                    format!("the proportions of {width}x{height}, the camera of {}", self.from),
+                ));
+            }
+            let camera = Camera { width, height, fx, fy, cx, cy };
+            return Ok(Resize::to_size((width, height), size).camera(&camera));
+        }
         if let Some((w, h)) = self.size.filter(|s| *s != size) {
             return Err(invalid(
                 depth_file,
@@ -39,16 +102,22 @@ impl Intrinsics {
                 format!("{w}x{h}, the size of the camera of {}", self.from),
             ));
         }
-        let [fx, fy, cx, cy] = self.focal_centre;
         Ok(Camera { width: size.0, height: size.1, fx, fy, cx, cy })
     }
 }
 
-/// Reads the first of `cam_params.json` (here or one folder up), `camera-intrinsics.txt` and
-/// `camera.txt` that exists.
+/// The camera of a plain folder of images.
+pub(super) const IMAGES_CAMERA: &str = "intrinsics.json";
+
+/// Reads the first of `cam_params.json` (here or up to two folders up), `intrinsics.json`,
+/// `camera-intrinsics.txt` and `camera.txt` that exists.
 pub(super) fn read(folder: &Folder) -> Result<Option<Intrinsics>, SequenceError> {
     if let Some(file) = folder.here_or_above("cam_params.json") {
         return from_json(folder, &file).map(Some);
+    }
+    if folder.has(IMAGES_CAMERA) {
+        let found = from_json(folder, IMAGES_CAMERA)?;
+        return Ok(Some(Intrinsics { scales: true, ..found }));
     }
     let found = if folder.has("camera-intrinsics.txt") {
         from_matrix(folder, "camera-intrinsics.txt")?
@@ -91,7 +160,10 @@ fn from_json(folder: &Folder, file: &str) -> Result<Intrinsics, SequenceError> {
     for (value, key) in distortion.iter_mut().zip(["k1", "k2", "p1", "p2", "k3"]) {
         *value = number(key)?.unwrap_or(0.0);
     }
-    let depth_scale = number("scale")?;
+    let depth_scale = match number("scale")? {
+        None => number("depth_scale")?,
+        given => given,
+    };
     if let Some(s) = depth_scale.filter(|s| !(s.is_finite() && *s > 0.0)) {
         return Err(invalid(shown, None, "camera.scale", s.to_string(), "units per metre > 0"));
     }
@@ -100,22 +172,22 @@ fn from_json(folder: &Folder, file: &str) -> Result<Intrinsics, SequenceError> {
         _ => None,
     };
     let focal_centre = [needed("fx")?, needed("fy")?, needed("cx")?, needed("cy")?];
-    checked(shown, Intrinsics { from: shown.into(), size, focal_centre, distortion, depth_scale })
+    let camera = Intrinsics::any_size(shown, focal_centre);
+    checked(shown, Intrinsics { size, distortion, depth_scale, ..camera })
 }
 
-/// A 3x3 matrix of nine numbers.
-fn from_matrix(folder: &Folder, file: &str) -> Result<Intrinsics, SequenceError> {
+/// A 3x3 or 4x4 matrix.
+pub(super) fn from_matrix(folder: &Folder, file: &str) -> Result<Intrinsics, SequenceError> {
     let numbers = parse_numbers(file, None, &folder.text(file)?)?;
-    let &[fx, _, cx, _, fy, cy, ..] = numbers.as_slice() else {
-        return Err(count_error(file, numbers.len(), "the 9 numbers of a 3x3 matrix"));
+    let focal_centre = match *numbers.as_slice() {
+        [fx, _, cx, _, fy, cy, _, _, _] => [fx, fy, cx, cy],
+        [fx, _, cx, _, _, fy, cy, _, ..] if numbers.len() == 16 => [fx, fy, cx, cy],
+        _ => {
+            let expected = "the 9 numbers of a 3x3 matrix, or the 16 of a 4x4 one";
+            return Err(count_error(file, numbers.len(), expected));
+        }
     };
-    if numbers.len() != 9 {
-        return Err(count_error(file, numbers.len(), "the 9 numbers of a 3x3 matrix"));
-    }
-    let focal_centre = [fx, fy, cx, cy];
-    let distortion = [0.0; 5];
-    let from = file.into();
-    checked(file, Intrinsics { from, size: None, focal_centre, distortion, depth_scale: None })
+    checked(file, Intrinsics::any_size(file, focal_centre))
 }
 
 /// `fx fy cx cy` or `fx fy cx cy k1 k2 p1 p2 k3`, with `#` comments.
@@ -129,15 +201,14 @@ fn from_line(folder: &Folder, file: &str) -> Result<Intrinsics, SequenceError> {
         [fx, fy, cx, cy, k1, k2, p1, p2, k3] => ([fx, fy, cx, cy], [k1, k2, p1, p2, k3]),
         _ => return Err(count_error(file, numbers.len(), expected)),
     };
-    let from = file.into();
-    checked(file, Intrinsics { from, size: None, focal_centre, distortion, depth_scale: None })
+    checked(file, Intrinsics { distortion, ..Intrinsics::any_size(file, focal_centre) })
 }
 
 fn count_error(file: &str, found: usize, expected: &str) -> SequenceError {
     invalid(file, None, "camera", format!("{found} numbers"), expected)
 }
 
-fn checked(file: &str, i: Intrinsics) -> Result<Intrinsics, SequenceError> {
+pub(super) fn checked(file: &str, i: Intrinsics) -> Result<Intrinsics, SequenceError> {
     let [fx, fy, ..] = i.focal_centre;
     let finite = i.focal_centre.iter().chain(&i.distortion).all(|x| x.is_finite());
     if !finite || fx <= 0.0 || fy <= 0.0 {
@@ -272,6 +343,15 @@ mod tests {
         assert!(i.camera("d.png", (8, 6)).unwrap_err().to_string().contains("8x6"));
         let i = read(&one_file("camera-intrinsics.txt", "5 0 1\n0 6 2\n0 0 1")).unwrap().unwrap();
         assert_eq!(i.focal_centre, [5.0, 6.0, 1.0, 2.0]);
+        let text = "5 0 1 0 0 6 2 0 0 0 1 0 0 0 0 1";
+        let i = read(&one_file("camera-intrinsics.txt", text)).unwrap().unwrap();
+        assert_eq!(i.focal_centre, [5.0, 6.0, 1.0, 2.0]);
+        let json = r#"{"w":8,"h":6,"fx":10,"fy":12,"cx":3.5,"cy":2.5,"depth_scale":500}"#;
+        let i = read(&one_file("intrinsics.json", json)).unwrap().unwrap();
+        assert_eq!(i.depth_scale, Some(500.0));
+        let half = i.camera("d.png", (4, 3)).unwrap();
+        assert_eq!((half.fx, half.fy, half.cx, half.cy), (5.0, 6.0, 1.5, 1.0));
+        assert!(i.camera("d.png", (4, 4)).unwrap_err().to_string().contains("proportions"));
         let i = read(&one_file("camera.txt", "# mine\n5 6 1 2 .1 .2 .3 .4 .5")).unwrap().unwrap();
         assert_eq!(i.distortion, [0.1, 0.2, 0.3, 0.4, 0.5]);
         for (name, text, part) in [
@@ -279,6 +359,7 @@ mod tests {
             ("camera.txt", "0 2 3 4", "fx and fy > 0"),
             ("camera.txt", "5 six 3 4", "\"six\""),
             ("camera-intrinsics.txt", "5 0 1 0 6 2", "6 numbers"),
+            ("intrinsics.json", r#"{"fx":5,"fy":5,"cx":1,"cy":1,"depth_scale":0}"#, "camera.scale"),
             ("cam_params.json", "{", "JSON"),
             ("cam_params.json", r#"{"camera":{"fx":"5"}}"#, "camera.fx"),
             ("cam_params.json", r#"{"camera":{"fx":5,"fy":5,"cx":1}}"#, "camera.cy"),

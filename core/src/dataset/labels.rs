@@ -4,7 +4,8 @@ use super::{
     decode::{self, Origin, Size},
     entries::Entry,
     folder::{Folder, invalid, number_between, plural},
-    resize::Resize,
+    resize::{Resize, same_aspect},
+    scannet::{self, RawIds},
 };
 use crate::{
     classes::{ClassTable, UNLABELLED},
@@ -13,18 +14,24 @@ use crate::{
 use std::collections::{BTreeMap, BTreeSet};
 
 const CLASSES_FILE: &str = "classes.json";
+/// Where label images lie beside the frames. Those of the second hold ScanNet's raw ids.
+const FOLDERS: [&str; 2] = ["semantic_class/", "label-filt/"];
+/// How the folder of ScanNet's raw ids is called, wherever it lies.
+const RAW_FOLDER: &str = "label-filt";
+/// The raw id of pixels that nobody labelled in ScanNet.
+const RAW_UNLABELLED: u16 = 0;
 /// In the look-up table: an id that is not in the class list.
 const UNKNOWN: u16 = 256;
 /// So many label images decide at opening whether the class list is theirs.
 const CHECKED_IMAGES: usize = 8;
-/// Width over height of a label image may differ from the depth image's by this share.
-pub(super) const ASPECT_TOLERANCE: f64 = 0.03;
 
 /// The label images of a recording.
 pub(super) struct Labels {
     /// Where they lie, when not beside the frames.
     own: Option<Folder>,
     pub table: ClassTable,
+    /// ScanNet's raw ids are translated first.
+    raw: Option<RawIds>,
     /// Raw id -> compact index, [`UNLABELLED`] or [`UNKNOWN`].
     index: Vec<u16>,
     met: Met,
@@ -61,11 +68,17 @@ impl Labels {
         size: Size,
         wanted: Wanted,
     ) -> Result<Option<Self>, SequenceError> {
+        let mut is_raw = false;
         match &mut own {
             None => {
-                if assign(recording, "semantic_class/", frames)? == 0 {
-                    return Ok(None);
+                let mut below = None;
+                for folder in FOLDERS {
+                    if below.is_none() && assign(recording, folder, frames)? > 0 {
+                        below = Some(folder);
+                    }
                 }
+                let Some(below) = below else { return Ok(None) };
+                is_raw = below.trim_end_matches('/') == RAW_FOLDER;
             }
             Some(folder) => {
                 let name = folder.name();
@@ -76,11 +89,19 @@ impl Labels {
                         return Err(invalid(&name, None, "label images", files, expected));
                     }
                 }
+                let name = folder.name();
+                let last = name.trim_end_matches(['/', '\\']).rsplit(['/', '\\']).next();
+                is_raw |= last.is_some_and(|last| last.ends_with(RAW_FOLDER));
             }
         }
         let images = own.as_ref().unwrap_or(recording);
+        let raw = match is_raw {
+            true => scannet::raw_ids(images)?.or(scannet::raw_ids(recording)?),
+            false => None,
+        };
         let listed = match (wanted.list, &own) {
             (Some(list), _) => Some(list),
+            (None, _) if raw.is_some() => Some(ClassList::nyu40()),
             (None, Some(folder)) if folder.has(CLASSES_FILE) => {
                 Some(ClassList::parse(CLASSES_FILE, &folder.text(CLASSES_FILE)?)?)
             }
@@ -95,16 +116,17 @@ impl Labels {
                     list.set_unlabelled(id);
                 }
                 if wanted.only_present {
-                    let present = scan(images, frames, size)?;
+                    let present = scan(images, frames, size, raw.as_ref())?;
                     list.table.classes.retain(|c| present.contains(&c.raw_id));
                 } else {
-                    check_list(&list, images, frames, size)?;
+                    check_list(&list, images, frames, size, raw.as_ref())?;
                 }
                 list
             }
             None => {
-                let mut list = ClassList::unnamed(scan(images, frames, size)?);
-                list.set_unlabelled(wanted.unlabelled.unwrap_or(DEFAULT_UNLABELLED));
+                let mut list = ClassList::unnamed(scan(images, frames, size, None)?);
+                let default = if is_raw { RAW_UNLABELLED } else { DEFAULT_UNLABELLED };
+                list.set_unlabelled(wanted.unlabelled.unwrap_or(default));
                 list
             }
         };
@@ -123,7 +145,7 @@ impl Labels {
             index[usize::from(id)] = UNLABELLED.into();
         }
         let met = Met { expected: size, ..Met::default() };
-        Ok(Some(Labels { own, table: ClassTable { classes }, index, met }))
+        Ok(Some(Labels { own, table: ClassTable { classes }, raw, index, met }))
     }
 
     /// The compact indices of one frame, in the size of its depth image.
@@ -135,7 +157,7 @@ impl Labels {
         size: Size,
     ) -> Result<Vec<u8>, SequenceError> {
         let folder = self.own.as_ref().unwrap_or(recording);
-        let (raw, stored) = decode(folder, file, frame, size)?;
+        let (raw, stored) = decode(folder, file, frame, size, self.raw.as_ref())?;
         let first = self.met.frames.insert(frame);
         if first && stored != size {
             self.met.resized += 1;
@@ -197,14 +219,17 @@ fn decode(
     file: &str,
     frame: u64,
     size: Size,
+    raw: Option<&RawIds>,
 ) -> Result<(Vec<u16>, Size), SequenceError> {
     let origin = Origin { file, frame, what: "label image" };
-    let (ids, stored) = decode::labels(&folder.read(file)?, origin)?;
+    let (mut ids, stored) = decode::labels(&folder.read(file)?, origin)?;
+    if let Some(raw) = raw {
+        ids.iter_mut().for_each(|id| *id = raw.nyu40(*id));
+    }
     if stored == size {
         return Ok((ids, stored));
     }
-    let aspect = |s: Size| f64::from(s.0) / f64::from(s.1);
-    if (aspect(stored) / aspect(size) - 1.0).abs() > ASPECT_TOLERANCE {
+    if !same_aspect(stored, size) {
         return Err(invalid(
             file,
             Some(frame),
@@ -222,6 +247,7 @@ fn check_list(
     folder: &Folder,
     frames: &[Entry],
     size: Size,
+    raw: Option<&RawIds>,
 ) -> Result<(), SequenceError> {
     let labelled: Vec<&Entry> = frames.iter().filter(|f| f.label.is_some()).collect();
     let known: BTreeSet<u16> = list.table.classes.iter().map(|c| c.raw_id).collect();
@@ -229,7 +255,7 @@ fn check_list(
     let mut unknown = BTreeSet::new();
     for frame in labelled.iter().step_by(labelled.len().div_ceil(CHECKED_IMAGES).max(1)) {
         let Some(file) = &frame.label else { continue };
-        for id in decode(folder, file, frame.number, size)?.0 {
+        for id in decode(folder, file, frame.number, size, raw)?.0 {
             if known.contains(&id) {
                 return Ok(());
             }
@@ -248,11 +274,16 @@ fn check_list(
 }
 
 /// All raw ids of all label images.
-fn scan(folder: &Folder, frames: &[Entry], size: Size) -> Result<BTreeSet<u16>, SequenceError> {
+fn scan(
+    folder: &Folder,
+    frames: &[Entry],
+    size: Size,
+    raw: Option<&RawIds>,
+) -> Result<BTreeSet<u16>, SequenceError> {
     let mut present = vec![false; 1 << 16];
     for frame in frames {
         let Some(file) = &frame.label else { continue };
-        for id in decode(folder, file, frame.number, size)?.0 {
+        for id in decode(folder, file, frame.number, size, raw)?.0 {
             present[usize::from(id)] = true;
         }
     }
@@ -279,7 +310,9 @@ fn assign(folder: &Folder, below: &str, frames: &mut [Entry]) -> Result<usize, S
     }
     let mut found = 0;
     for frame in frames.iter_mut() {
-        let same = by_stem.get(stem(&frame.color)).or_else(|| by_stem.get(stem(&frame.depth)));
+        // The name of a file that holds all images says nothing of one.
+        let whole = [&frame.color, &frame.depth].into_iter().filter(|s| s.part.is_none());
+        let same = whole.filter_map(|s| by_stem.get(stem(&s.file))).next();
         frame.label = same.map(|n| (*n).into());
         found += usize::from(same.is_some());
     }

@@ -1,5 +1,5 @@
 //! The folder layouts and how they are recognised.
-use super::folder::Folder;
+use super::{folder::Folder, images, intrinsics::IMAGES_CAMERA, nerfstudio, sens};
 use crate::sequence::SequenceError;
 use core::{fmt, str::FromStr};
 
@@ -14,6 +14,14 @@ pub enum Layout {
     Tum,
     /// 7-Scenes: `frame-000000.color.png`, `frame-000000.depth.png`.
     SevenScenes,
+    /// ScanNet, exported: `color/0.jpg`, `depth/0.png`, `pose/0.txt`, `intrinsic/`.
+    ScanNet,
+    /// ScanNet, packed: one `.sens` file.
+    Sens,
+    /// nerfstudio's `transforms.json`, with depth.
+    Nerfstudio,
+    /// Any folders of colour and depth images with a camera given; taken when nothing else fits.
+    Images,
 }
 
 pub(super) const COLOR_ENDS: [&str; 3] = [".jpg", ".png", ".jpeg"];
@@ -21,8 +29,16 @@ pub(super) const SEVEN_COLOR_ENDS: [&str; 3] = [".color.png", ".color.jpg", ".co
 
 impl Layout {
     /// All layouts.
-    pub const ALL: [Layout; 4] =
-        [Layout::ReplicaNice, Layout::ReplicaVmap, Layout::Tum, Layout::SevenScenes];
+    pub const ALL: [Layout; 8] = [
+        Layout::ReplicaNice,
+        Layout::ReplicaVmap,
+        Layout::Tum,
+        Layout::SevenScenes,
+        Layout::ScanNet,
+        Layout::Sens,
+        Layout::Nerfstudio,
+        Layout::Images,
+    ];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
@@ -31,38 +47,58 @@ impl Layout {
             Layout::ReplicaVmap => "replica-vmap",
             Layout::Tum => "tum",
             Layout::SevenScenes => "7scenes",
+            Layout::ScanNet => "scannet",
+            Layout::Sens => "sens",
+            Layout::Nerfstudio => "nerfstudio",
+            Layout::Images => "images",
         }
     }
 
     /// The files that mark the layout: what they look like, and how many there are.
-    fn marks(self, folder: &Folder) -> [(&'static str, usize); 2] {
+    fn marks(self, folder: &Folder, camera_given: bool) -> Vec<(&'static str, usize)> {
         match self {
-            Layout::ReplicaNice => [
+            Layout::ReplicaNice => vec![
                 ("results/frame<number>.jpg|png", folder.count("results/frame", &COLOR_ENDS)),
                 ("results/depth<number>.png", folder.count("results/depth", &[".png"])),
             ],
-            Layout::ReplicaVmap => [
+            Layout::ReplicaVmap => vec![
                 ("rgb/rgb_<number>.png|jpg", folder.count("rgb/rgb_", &COLOR_ENDS)),
                 ("depth/depth_<number>.png", folder.count("depth/depth_", &[".png"])),
             ],
-            Layout::Tum => [
+            Layout::Tum => vec![
                 ("rgb.txt", folder.has("rgb.txt").into()),
                 ("depth.txt", folder.has("depth.txt").into()),
             ],
-            Layout::SevenScenes => [
+            Layout::SevenScenes => vec![
                 ("frame-<number>.color.png|jpg", folder.count("frame-", &SEVEN_COLOR_ENDS)),
                 ("frame-<number>.depth.png", folder.count("frame-", &[".depth.png"])),
             ],
+            Layout::ScanNet => vec![
+                ("color/<number>.jpg|png", folder.count("color/", &COLOR_ENDS)),
+                ("depth/<number>.png", folder.count("depth/", &[".png"])),
+                ("pose/<number>.txt", folder.count("pose/", &[".txt"])),
+            ],
+            Layout::Sens => vec![("<name>.sens", sens::files_of(folder).len())],
+            Layout::Nerfstudio => vec![(nerfstudio::FILE, folder.has(nerfstudio::FILE).into())],
+            Layout::Images => {
+                let camera = camera_given || folder.has(IMAGES_CAMERA);
+                vec![
+                    ("color|rgb|images/<name>.jpg|png", images::colors(folder).len()),
+                    ("depth/<name>.png", images::depths(folder).len()),
+                    ("intrinsics.json (or a camera given)", camera.into()),
+                ]
+            }
         }
     }
 
-    fn fits(self, folder: &Folder) -> bool {
-        self.marks(folder).iter().all(|(_, n)| *n > 0)
+    fn fits(self, folder: &Folder, camera_given: bool) -> bool {
+        self.marks(folder, camera_given).iter().all(|(_, n)| *n > 0)
     }
 
-    fn report(self, folder: &Folder) -> String {
-        let [(a, n), (b, m)] = self.marks(folder);
-        format!("{self} needs {a} (found {n}) and {b} (found {m})")
+    fn report(self, folder: &Folder, camera_given: bool) -> String {
+        let marks = self.marks(folder, camera_given);
+        let marks: Vec<String> = marks.iter().map(|(m, n)| format!("{m} (found {n})")).collect();
+        format!("{self} needs {}", marks.join(" and "))
     }
 
     /// Finds the layout, going into the one sub-folder that holds everything if there is one.
@@ -70,6 +106,7 @@ impl Layout {
     pub(super) fn detect(
         folder: &mut Folder,
         wanted: Option<Layout>,
+        camera_given: bool,
     ) -> Result<Layout, SequenceError> {
         let name = folder.name();
         let mut reason = String::new();
@@ -78,8 +115,12 @@ impl Layout {
                 Some(layout) => vec![layout],
                 None => Layout::ALL.into(),
             };
-            let fitting: Vec<Layout> =
-                candidates.iter().copied().filter(|l| l.fits(folder)).collect();
+            let mut fitting: Vec<Layout> =
+                candidates.iter().copied().filter(|l| l.fits(folder, camera_given)).collect();
+            // Most recordings with a list or poses of their own are such folders, too.
+            if fitting.len() > 1 {
+                fitting.retain(|l| *l != Layout::Images);
+            }
             match fitting.as_slice() {
                 [one] => return Ok(*one),
                 [] => {}
@@ -92,7 +133,8 @@ impl Layout {
             }
             if reason.is_empty() {
                 let files = folder.names().count();
-                let reports: Vec<String> = candidates.iter().map(|l| l.report(folder)).collect();
+                let reports: Vec<String> =
+                    candidates.iter().map(|l| l.report(folder, camera_given)).collect();
                 reason = match files {
                     0 => "the folder is empty".into(),
                     _ => format!("of {files} files: {}", reports.join("; ")),
@@ -133,7 +175,7 @@ mod tests {
         for n in names {
             m.insert(*n, "");
         }
-        Layout::detect(&mut Folder::new(Box::new(m)).unwrap(), wanted)
+        Layout::detect(&mut Folder::new(Box::new(m)).unwrap(), wanted, false)
     }
 
     #[test]
@@ -141,7 +183,7 @@ mod tests {
         for layout in Layout::ALL {
             assert_eq!(layout.to_string().parse(), Ok(layout));
         }
-        assert!("scannet".parse::<Layout>().unwrap_err().contains("7scenes"));
+        assert!("scanet".parse::<Layout>().unwrap_err().contains("7scenes"));
     }
 
     #[test]
@@ -154,6 +196,14 @@ mod tests {
         assert_eq!(detect(&["rgb.txt", "depth.txt"], None).unwrap(), Layout::Tum);
         assert_eq!(detect(&seven, None).unwrap(), Layout::SevenScenes);
         assert_eq!(detect(&seven, Some(Layout::SevenScenes)).unwrap(), Layout::SevenScenes);
+        let scannet =
+            ["scans/scene/color/0.jpg", "scans/scene/depth/0.png", "scans/scene/pose/0.txt"];
+        assert_eq!(detect(&scannet, None).unwrap(), Layout::ScanNet);
+        assert_eq!(detect(&["scene/scene.sens"], None).unwrap(), Layout::Sens);
+        let capture = ["transforms.json", "images/0.png", "depth/0.png", "intrinsics.json"];
+        assert_eq!(detect(&capture, None).unwrap(), Layout::Nerfstudio);
+        assert_eq!(detect(&capture[1..], None).unwrap(), Layout::Images);
+        assert!(detect(&capture[1..3], None).unwrap_err().to_string().contains("intrinsics.json"));
     }
 
     #[test]

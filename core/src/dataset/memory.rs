@@ -1,5 +1,5 @@
 //! A [`Source`] that holds its files in memory.
-use crate::sequence::{SequenceError, Source};
+use crate::sequence::{SequenceError, Source, too_short};
 use std::collections::BTreeMap;
 
 /// Files by name, for tests, for unpacked archives and for files dropped on a page.
@@ -50,5 +50,21 @@ impl Source for MemorySource {
             file: file.into(),
             reason: format!("no such file in {}", self.name),
         })
+    }
+
+    fn size(&self, file: &str) -> Result<u64, SequenceError> {
+        match self.files.get(file) {
+            Some(bytes) => Ok(bytes.len() as u64),
+            None => self.read(file).map(|b| b.len() as u64),
+        }
+    }
+
+    fn read_range(&self, file: &str, offset: u64, bytes: usize) -> Result<Vec<u8>, SequenceError> {
+        let Some(whole) = self.files.get(file) else { return self.read(file) };
+        let first = usize::try_from(offset).ok();
+        first
+            .and_then(|first| whole.get(first..first.checked_add(bytes)?))
+            .map(<[u8]>::to_vec)
+            .ok_or_else(|| too_short(file, whole.len() as u64, offset, bytes))
     }
 }

@@ -1,14 +1,14 @@
 //! Opening a recording, and decoding its frames.
 use super::{
     class_list::ClassList,
-    decode::{self, Origin, Size},
+    decode::Size,
     entries::{self, Entry},
     features::Features,
     folder::{Folder, invalid, plural},
-    intrinsics::Rectifier,
-    labels::{ASPECT_TOLERANCE, Labels, Wanted},
+    intrinsics::{Intrinsics, Rectifier, checked},
+    labels::{Labels, Wanted},
     layout::Layout,
-    resize::Resize,
+    resize::{Resize, same_aspect},
 };
 use crate::{
     classes::ClassTable,
@@ -33,10 +33,71 @@ pub enum LabelSource {
     Folder(Box<dyn Source>),
 }
 
+/// A camera given by people, of images of any size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GivenCamera {
+    /// fx, fy, cx, cy \[pixels\]; the centre of the first pixel is (0, 0).
+    pub focal_centre: [f64; 4],
+    /// k1, k2, p1, p2, k3 of OpenCV's distortion.
+    pub distortion: [f64; 5],
+}
+
+impl GivenCamera {
+    /// From `fx fy cx cy`, or from these and `k1 k2 p1 p2 k3`.
+    pub fn from_numbers(numbers: &[f64]) -> Option<GivenCamera> {
+        match *numbers {
+            [fx, fy, cx, cy] => {
+                Some(GivenCamera { focal_centre: [fx, fy, cx, cy], distortion: [0.0; 5] })
+            }
+            [fx, fy, cx, cy, k1, k2, p1, p2, k3] => Some(GivenCamera {
+                focal_centre: [fx, fy, cx, cy],
+                distortion: [k1, k2, p1, p2, k3],
+            }),
+            _ => None,
+        }
+    }
+
+    /// All nine numbers, as [`GivenCamera::from_numbers`] takes them.
+    pub fn numbers(&self) -> Vec<f64> {
+        self.focal_centre.iter().chain(&self.distortion).copied().collect()
+    }
+}
+
+/// Axes of a camera.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Axes {
+    /// x right, y down, z forward, as everywhere here.
+    #[default]
+    OpenCv,
+    /// x right, y up, z backward, as OpenGL, Blender and nerfstudio have it.
+    OpenGl,
+}
+
+impl Axes {
+    /// Names on the command line.
+    pub const NAMES: [&str; 2] = ["opencv", "opengl"];
+
+    /// From its name.
+    pub fn named(name: &str) -> Option<Axes> {
+        match name {
+            "opencv" => Some(Axes::OpenCv),
+            "opengl" => Some(Axes::OpenGl),
+            _ => None,
+        }
+    }
+}
+
 /// What of a recording is read, and how.
 pub struct OpenOptions {
     /// The layout, or `None` to recognise it by its files.
     pub layout: Option<Layout>,
+    /// The camera of the depth images, instead of any file's.
+    pub camera: Option<GivenCamera>,
+    /// Units of depth per metre, instead of the layout's.
+    pub depth_scale: Option<f64>,
+    /// How the cameras of the ground-truth poses lie. Layouts with axes of their own (nerfstudio)
+    /// are turned before; the default is right for them.
+    pub axes: Axes,
     /// First frame, counted from 0 in the recording's order.
     pub start: usize,
     /// Every how manieth frame is used, at least 1.
@@ -65,6 +126,9 @@ impl Default for OpenOptions {
     fn default() -> Self {
         Self {
             layout: None,
+            camera: None,
+            depth_scale: None,
+            axes: Axes::default(),
             start: 0,
             stride: 1,
             frames: None,
@@ -101,9 +165,27 @@ pub fn open(
     if !(options.scale > 0.0 && options.scale <= 1.0) {
         return wrong("scale", options.scale.to_string(), "a number in (0, 1]");
     }
-    let layout = Layout::detect(&mut folder, options.layout)?;
-    let mut all = entries::read(&folder, layout)?;
+    if let Some(units) = options.depth_scale.filter(|s| !(s.is_finite() && *s > 0.0)) {
+        return wrong("depth scale", units.to_string(), "units of depth per metre > 0");
+    }
+    let given = match options.camera {
+        None => None,
+        Some(GivenCamera { focal_centre, distortion }) => {
+            let given = Intrinsics::any_size("the camera given", focal_centre);
+            Some(checked("the camera given", Intrinsics { distortion, ..given })?)
+        }
+    };
+    let layout = Layout::detect(&mut folder, options.layout, given.is_some())?;
+    let mut all = entries::read(&folder, layout, given)?;
     let mut warnings = std::mem::take(&mut all.warnings);
+    if let Some(units) = options.depth_scale {
+        all.depth_unit_m = 1.0 / units;
+    }
+    if options.axes == Axes::OpenGl {
+        for frame in &mut all.frames {
+            frame.truth = frame.truth.map(|pose| pose.with_flipped_camera());
+        }
+    }
 
     let there = all.frames.len();
     let wanted = options.frames.unwrap_or(usize::MAX);
@@ -115,7 +197,7 @@ pub fn open(
         return Err(invalid(&folder.name(), None, "start", found, expected));
     };
     for frame in &frames {
-        for file in [&frame.color, &frame.depth] {
+        for file in [&frame.color.file, &frame.depth.file] {
             if !folder.has(file) {
                 let number = frame.number;
                 let reason = format!("no such file in {} (frame {number})", folder.name());
@@ -124,12 +206,14 @@ pub fn open(
         }
     }
 
-    let depth_origin = Origin { file: &first.depth, frame: first.number, what: "depth image" };
-    let depth_size = decode::size_of(&folder.read(&first.depth)?, depth_origin)?;
-    let color_origin = Origin { file: &first.color, frame: first.number, what: "colour image" };
-    let color_size = decode::size_of(&folder.read(&first.color)?, color_origin)?;
-    let mut camera = all.intrinsics.camera(&first.depth, depth_size)?;
-    check_aspect(&first.color, first.number, color_size, depth_size)?;
+    let depth_size = first.depth.size(&folder, first.number, "depth image")?;
+    let color_size = first.color.size(&folder, first.number, "colour image")?;
+    let mut camera = all.intrinsics.camera(&first.depth.file, depth_size)?;
+    check_aspect(&first.color.file, first.number, color_size, depth_size)?;
+    if color_size != depth_size {
+        let ((w, h), (to_w, to_h)) = (color_size, depth_size);
+        warnings.push(format!("colour of {w}x{h} fitted to the {to_w}x{to_h} of depth"));
+    }
 
     let color_to_depth = Resize::to_size(color_size, depth_size);
     let rectifier = if all.intrinsics.distortion == [0.0; 5] {
@@ -183,6 +267,7 @@ pub fn open(
 
     let name = folder.name();
     let last = name.trim_end_matches(['/', '\\']).rsplit(['/', '\\']).next().unwrap_or_default();
+    let last = last.strip_suffix(".sens").unwrap_or(last);
     let info = SequenceInfo {
         name: last.into(),
         layout: layout.name(),
@@ -211,9 +296,7 @@ pub fn open(
 
 /// Colour is stretched to the size of depth, which is right only when both show the same.
 fn check_aspect(file: &str, frame: u64, color: Size, depth: Size) -> Result<(), SequenceError> {
-    let aspect = |s: Size| f64::from(s.0) / f64::from(s.1);
-    let ratio = aspect(color) / aspect(depth);
-    if (ratio - 1.0).abs() > ASPECT_TOLERANCE {
+    if !same_aspect(color, depth) {
         return Err(invalid(
             file,
             Some(frame),
@@ -272,13 +355,8 @@ impl Sequence for Reader {
             .ok_or(SequenceError::OutOfRange { index, frames: self.frames.len() })?
             .clone();
         let frame = entry.number;
-        let origin = Origin { file: &entry.color, frame, what: "colour image" };
-        let bytes = self.folder.read(&entry.color)?;
-        let color = self.fit_color(decode::color(&bytes, origin, Some(self.color_size))?);
-
-        let origin = Origin { file: &entry.depth, frame, what: "depth image" };
-        let bytes = self.folder.read(&entry.depth)?;
-        let mut depth = decode::depth(&bytes, origin, Some(self.depth_size))?;
+        let color = self.fit_color(entry.color.color(&self.folder, frame, self.color_size)?);
+        let mut depth = entry.depth.depth(&self.folder, frame, self.depth_size)?;
         if let Some(marker) = self.invalid_depth {
             for d in depth.iter_mut().filter(|d| **d == marker) {
                 *d = 0;
@@ -308,6 +386,10 @@ impl Sequence for Reader {
 
     fn time_s(&self, index: usize) -> f64 {
         self.frames.get(index).map_or(f64::NAN, |f| f.time_s)
+    }
+
+    fn number(&self, index: usize) -> u64 {
+        self.frames.get(index).map_or(index as u64, |f| f.number)
     }
 
     fn warnings(&self) -> Vec<String> {

@@ -2,6 +2,15 @@
 use super::decode::Size;
 use crate::camera::Camera;
 
+/// Width over height of two images of one scene may differ by this share.
+pub(super) const ASPECT_TOLERANCE: f64 = 0.03;
+
+/// Whether one size is the other, enlarged, within a tolerance.
+pub(super) fn same_aspect(a: Size, b: Size) -> bool {
+    let aspect = |s: Size| f64::from(s.0) / f64::from(s.1);
+    (aspect(a) / aspect(b) - 1.0).abs() <= ASPECT_TOLERANCE
+}
+
 /// One axis of a resize: `from` pixels become `to`, each `ratio` wide.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Axis {

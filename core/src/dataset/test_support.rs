@@ -61,9 +61,13 @@ pub fn replica(n: usize) -> MemorySource {
 
 /// The same images under the names of another layout; with two-digit frame numbers not padded.
 pub fn renamed(n: usize, layout: Layout) -> MemorySource {
+    if layout == Layout::Sens {
+        return sens(n);
+    }
     let from = replica(n);
     let mut to = MemorySource::new("tiny");
     let poses = String::from_utf8(from.get("traj.txt").unwrap().to_vec()).unwrap();
+    let mut nerf_frames = Vec::new();
     let (mut rgb_list, mut depth_list, mut truth) = (String::new(), String::new(), String::new());
     for (i, line) in poses.lines().enumerate() {
         let color = from.get(&format!("results/frame{i:06}.png")).unwrap();
@@ -79,6 +83,23 @@ pub fn renamed(n: usize, layout: Layout) -> MemorySource {
                 to.insert(format!("frame-{i:06}.pose.txt"), line.replace(' ', "\n"));
                 (format!("frame-{i:06}.color.png"), format!("frame-{i:06}.depth.png"))
             }
+            Layout::ScanNet => {
+                to.insert(format!("pose/{i}.txt"), line);
+                (format!("color/{i}.png"), format!("depth/{i}.png"))
+            }
+            Layout::Images => (format!("rgb/view{i}.png"), format!("depth/view{i}.png")),
+            Layout::Nerfstudio => {
+                let turned = frame(i).truth.unwrap().with_flipped_camera().to_row_major();
+                let rows: Vec<&[f64]> = turned.chunks(4).collect();
+                let (c, d) = (format!("images/{i}.png"), format!("depth/{i}.png"));
+                let one = serde_json::json!({
+                    "file_path": c, "depth_file_path": d, "transform_matrix": rows,
+                });
+                // Listed from the last to the first.
+                nerf_frames.insert(0, one);
+                (c, d)
+            }
+            Layout::Sens => unreachable!("made above"),
         };
         let time = 100.0 + i as f64 / 30.0;
         rgb_list += &format!("{time:.4} {c}\n");
@@ -97,13 +118,54 @@ pub fn renamed(n: usize, layout: Layout) -> MemorySource {
             to.insert("depth.txt", format!("# depth\r\n{depth_list}"));
             to.insert("groundtruth.txt", truth);
         }
-        Layout::SevenScenes => {}
+        Layout::SevenScenes | Layout::ScanNet | Layout::Sens => {}
         Layout::ReplicaNice | Layout::ReplicaVmap => to.insert("traj.txt", poses),
+        Layout::Images => {
+            to.insert("poses.txt", poses);
+            let c = info().camera;
+            let json = serde_json::json!({
+                "w": c.width, "h": c.height, "fx": c.fx, "fy": c.fy, "cx": c.cx, "cy": c.cy,
+                "depth_scale": 5000,
+            });
+            to.insert("intrinsics.json", json.to_string());
+        }
+        Layout::Nerfstudio => {
+            let c = info().camera;
+            let json = serde_json::json!({
+                "camera_model": "OPENCV", "w": c.width, "h": c.height, "fl_x": c.fx, "fl_y": c.fy,
+                "cx": c.cx + 0.5, "cy": c.cy + 0.5, "integer_depth_scale": 1.0 / 5000.0,
+                "frames": nerf_frames,
+            });
+            to.insert("transforms.json", json.to_string());
+        }
+    }
+    if matches!(layout, Layout::Images | Layout::Nerfstudio) {
+        for file in ["classes.json", "bound.json"] {
+            to.insert(file, from.get(file).unwrap());
+        }
+        return to;
     }
     for file in ["cam_params.json", "classes.json", "bound.json"] {
         to.insert(file, from.get(file).unwrap());
     }
     to
+}
+
+/// The same packed, with labels beside it.
+pub fn sens(n: usize) -> MemorySource {
+    let (mut m, mut packed) = (MemorySource::new("tiny"), Vec::new());
+    let info = SequenceInfo { frames: n, ..info() };
+    let sink = |name: &str, bytes: &[u8]| {
+        m.insert(name, bytes);
+        Ok(())
+    };
+    let mut writer = SensWriter::new(&info, ColorFormat::Png, "tiny.sens", &mut packed, sink);
+    for i in 0..n {
+        writer.write(&frame(i)).unwrap();
+    }
+    assert_eq!(writer.finish().unwrap(), n);
+    m.insert("tiny.sens", packed);
+    m
 }
 
 /// Opens with default options.

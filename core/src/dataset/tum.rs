@@ -20,8 +20,8 @@ const CAMERAS: [(&str, [f64; 4], Distortion); 3] = [
 /// Reads the lists and the ground truth.
 pub(super) fn read(folder: &Folder) -> Result<Entries, SequenceError> {
     let mut warnings = Vec::new();
-    let colors = file_list(folder, "rgb.txt")?;
-    let depths = file_list(folder, "depth.txt")?;
+    let colors = file_list(folder, "rgb.txt", &mut warnings)?;
+    let depths = file_list(folder, "depth.txt", &mut warnings)?;
     let truths = if folder.has("groundtruth.txt") {
         ground_truth(folder, "groundtruth.txt")?
     } else {
@@ -40,8 +40,8 @@ pub(super) fn read(folder: &Folder) -> Result<Entries, SequenceError> {
         frames.push(Entry {
             number: frames.len() as u64,
             time_s: *time_s,
-            color: color.clone(),
-            depth: depths[depth].1.clone(),
+            color: color.clone().into(),
+            depth: depths[depth].1.clone().into(),
             label: None,
             truth: truth_of[i].and_then(|t| truths[t].1),
         });
@@ -104,7 +104,11 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 }
 
 /// `stamp file` a line, sorted by stamp.
-fn file_list(folder: &Folder, list: &str) -> Result<Vec<(f64, String)>, SequenceError> {
+fn file_list(
+    folder: &Folder,
+    list: &str,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<(f64, String)>, SequenceError> {
     let mut files = Vec::new();
     for (n, line) in lines(&folder.text(list)?) {
         let entry = line.split_once(char::is_whitespace).and_then(|(stamp, file)| {
@@ -115,6 +119,9 @@ fn file_list(folder: &Folder, list: &str) -> Result<Vec<(f64, String)>, Sequence
             invalid(list, None, format!("line {n}"), shortened(line), "a time stamp and a file")
         })?;
         files.push(entry);
+    }
+    if !files.is_sorted_by(|a, b| a.0 <= b.0) {
+        warnings.push(format!("{list} is not in the order of its time stamps: sorted"));
     }
     files.sort_by(|a, b| a.0.total_cmp(&b.0));
     Ok(files)

@@ -1,6 +1,6 @@
 //! `mte-slam eval`: the figures again, from files alone.
 use crate::{
-    args::{ClassArgs, CullChoice, EvalArgs, SelectionArgs},
+    args::{ClassArgs, CullChoice, EvalArgs, SelectionArgs, SensorArgs},
     class_truth::ClassTruth,
     evaluation::{self, MeshTruth, ViewScores},
     input,
@@ -15,6 +15,7 @@ use anyhow::{Context, Result, bail};
 use image::{ColorType, DynamicImage};
 use mte_slam_core::{
     classes::{ClassTable, UNLABELLED},
+    dataset::GivenCamera,
     frame::SequenceInfo,
     mesh::read_ply,
     metrics::PosePair,
@@ -44,6 +45,11 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
         stride: record.stride,
         start: record.start,
         scale: record.scale,
+        sensor: SensorArgs {
+            camera: record.camera.as_deref().and_then(GivenCamera::from_numbers),
+            depth_scale: record.depth_scale,
+            axes: record.axes.clone(),
+        },
         labels: args.labels.clone().unwrap_or_else(|| record.labels.clone()),
         truth_labels: args.truth_labels.clone(),
         features: None,

@@ -1,9 +1,11 @@
 //! One file a subcommand.
 pub mod ablate;
 pub mod bench;
+pub mod convert;
 pub mod demo;
 pub mod eval;
 pub mod info;
+pub mod inspect;
 pub mod mesh;
 pub mod render;
 pub mod run;

@@ -1,7 +1,7 @@
 //! Files that the user gave: dropped, picked, or of a picked folder.
 use super::MAX_FILE_BYTES;
 use js_sys::{Reflect, Uint8Array};
-use mte_slam_core::sequence::{SequenceError, Source};
+use mte_slam_core::sequence::{SequenceError, Source, too_short};
 use std::collections::BTreeMap;
 use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{Blob, FileReaderSync};
@@ -53,6 +53,23 @@ impl Source for FilesSource {
             return Err(failed(reason));
         }
         read_blob(blob).map_err(failed)
+    }
+
+    fn size(&self, file: &str) -> Result<u64, SequenceError> {
+        let blob = self.files.get(file).ok_or_else(|| SequenceError::Read {
+            file: file.into(),
+            reason: "no such file".into(),
+        })?;
+        Ok(blob.size() as u64)
+    }
+
+    fn read_range(&self, file: &str, offset: u64, bytes: usize) -> Result<Vec<u8>, SequenceError> {
+        let failed = |reason: String| SequenceError::Read { file: file.into(), reason };
+        let size = self.size(file)?;
+        let end = offset.checked_add(bytes as u64).filter(|end| *end <= size);
+        let end = end.ok_or_else(|| too_short(file, size, offset, bytes))?;
+        let part = self.files[file].slice_with_f64_and_f64(offset as f64, end as f64);
+        read_blob(&part.map_err(|e| failed(reason(&e)))?).map_err(failed)
     }
 }
 

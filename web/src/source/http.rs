@@ -2,7 +2,7 @@
 //! listing pages that most servers make.
 use super::{MAX_FILE_BYTES, files::reason, last_part, listing};
 use js_sys::Uint8Array;
-use mte_slam_core::sequence::{SequenceError, Source};
+use mte_slam_core::sequence::{SequenceError, Source, too_short};
 use std::collections::BTreeSet;
 use wasm_bindgen::JsValue;
 use web_sys::{XmlHttpRequest, XmlHttpRequestResponseType};
@@ -25,6 +25,14 @@ pub(super) struct Answer {
     pub status: u16,
     pub body: Vec<u8>,
     pub request: XmlHttpRequest,
+}
+
+impl Answer {
+    /// The length of the whole, from the answer to a range: `Content-Range: bytes 0-0/1234`.
+    pub fn whole_length(&self) -> Option<u64> {
+        let range = self.request.get_response_header("Content-Range").ok().flatten()?;
+        range.rsplit('/').next()?.parse().ok()
+    }
 }
 
 /// Asks and waits; `range` is in bytes, the last one included.
@@ -122,6 +130,40 @@ impl Source for HttpSource {
         match answer.status {
             200 => Ok(answer.body),
             status => Err(failed(format!("the server answers {status}, expected 200"))),
+        }
+    }
+
+    fn size(&self, file: &str) -> Result<u64, SequenceError> {
+        let answer = self.range(file, 0, 0)?;
+        answer.whole_length().ok_or_else(|| SequenceError::Read {
+            file: file.into(),
+            reason: "the server sends ranges but hides the length (Content-Range)".into(),
+        })
+    }
+
+    fn read_range(&self, file: &str, offset: u64, bytes: usize) -> Result<Vec<u8>, SequenceError> {
+        if bytes == 0 {
+            return Ok(Vec::new());
+        }
+        let answer = self.range(file, offset, offset.saturating_add(bytes as u64 - 1))?;
+        if answer.body.len() != bytes {
+            return Err(too_short(file, offset + answer.body.len() as u64, offset, bytes));
+        }
+        Ok(answer.body)
+    }
+}
+
+impl HttpSource {
+    /// Bytes `first..=last`. Without ranges each part would cost the whole file, so that is an
+    /// error.
+    fn range(&self, file: &str, first: u64, last: u64) -> Result<Answer, SequenceError> {
+        let failed = |reason: String| SequenceError::Read { file: file.into(), reason };
+        let url = format!("{}{}", self.base, listing::encoded(file));
+        let answer = ask("GET", &url, Some((first, last))).map_err(failed)?;
+        match answer.status {
+            206 => Ok(answer),
+            200 => Err(failed("the server sends no ranges, which so large a file needs".into())),
+            status => Err(failed(format!("the server answers {status}, expected 206"))),
         }
     }
 }

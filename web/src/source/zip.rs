@@ -1,11 +1,10 @@
 //! Archives: local ones are read in pieces, those on a server by ranges where it allows.
 use super::{MAX_FILE_BYTES, files::read_blob, http::ask, last_part};
-use ::zip::{ZipArchive, result::ZipError};
-use mte_slam_core::sequence::{SequenceError, Source};
-use std::{
-    cell::RefCell,
-    io::{self, Read, Seek, SeekFrom},
+use mte_slam_core::{
+    dataset,
+    sequence::{SequenceError, Source},
 };
+use std::io::{self, Read, Seek, SeekFrom};
 use web_sys::Blob;
 
 /// Read at once: small reads of a central directory become few requests.
@@ -65,9 +64,7 @@ impl Seek for Pieces {
 
 /// The files of an archive.
 pub struct ZipSource {
-    name: String,
-    names: Vec<String>,
-    archive: RefCell<ZipArchive<Pieces>>,
+    archive: dataset::ZipSource<Pieces>,
     /// Whether a server sent the whole archive because it knows no ranges.
     pub whole: bool,
 }
@@ -95,11 +92,8 @@ impl ZipSource {
         let probe = ask("GET", url, Some((0, 0))).map_err(failed)?;
         let name = last_part(url);
         match probe.status {
-            // `Content-Range: bytes 0-0/1234`
             206 => {
-                let range = probe.request.get_response_header("Content-Range").ok().flatten();
-                let length = range.and_then(|r| r.rsplit('/').next()?.parse::<u64>().ok());
-                let length = length.ok_or_else(|| {
+                let length = probe.whole_length().ok_or_else(|| {
                     failed("the server sends ranges but hides the length (Content-Range)".into())
                 })?;
                 let address = url.to_owned();
@@ -124,53 +118,29 @@ impl ZipSource {
     }
 
     fn new(name: &str, pieces: Pieces, whole: bool) -> Result<Self, SequenceError> {
-        let archive = ZipArchive::new(pieces).map_err(|e| invalid(name, &e))?;
-        let names = archive
-            .file_names()
-            .filter(|n| !n.ends_with('/') && super::listing::is_inside(n))
-            // What macOS adds beside every file.
-            .filter(|n| !n.starts_with("__MACOSX/"))
-            .map(String::from)
-            .collect();
-        Ok(Self { name: name.into(), names, archive: RefCell::new(archive), whole })
-    }
-}
-
-fn invalid(file: &str, error: &ZipError) -> SequenceError {
-    SequenceError::Invalid {
-        file: file.into(),
-        frame: None,
-        field: "archive".into(),
-        found: error.to_string(),
-        expected: "a zip archive, stored or deflated, without a password".into(),
+        Ok(Self { archive: dataset::ZipSource::new(name, pieces, MAX_FILE_BYTES)?, whole })
     }
 }
 
 impl Source for ZipSource {
     fn name(&self) -> &str {
-        // "room.zip" holds "room".
-        self.name.strip_suffix(".zip").unwrap_or(&self.name)
+        self.archive.name()
     }
 
     fn list(&self) -> Result<Vec<String>, SequenceError> {
-        Ok(self.names.clone())
+        self.archive.list()
     }
 
     fn read(&self, file: &str) -> Result<Vec<u8>, SequenceError> {
-        let failed = |reason: String| SequenceError::Read { file: file.into(), reason };
-        let mut archive = self.archive.borrow_mut();
-        let entry = archive.by_name(file).map_err(|e| invalid(file, &e))?;
-        let size = entry.size();
-        if size > MAX_FILE_BYTES {
-            return Err(failed(format!("{size} bytes, expected at most {MAX_FILE_BYTES}")));
-        }
-        // The size is only what the archive claims, so reading stops there, too.
-        let mut bytes = Vec::with_capacity(size as usize);
-        entry.take(size + 1).read_to_end(&mut bytes).map_err(|e| failed(e.to_string()))?;
-        if bytes.len() as u64 != size {
-            return Err(failed(format!("{} bytes or more, expected {size}", bytes.len())));
-        }
-        Ok(bytes)
+        self.archive.read(file)
+    }
+
+    fn size(&self, file: &str) -> Result<u64, SequenceError> {
+        self.archive.size(file)
+    }
+
+    fn read_range(&self, file: &str, offset: u64, bytes: usize) -> Result<Vec<u8>, SequenceError> {
+        self.archive.read_range(file, offset, bytes)
     }
 }
 
