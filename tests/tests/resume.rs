@@ -223,7 +223,7 @@ fn what_does_not_fit_is_refused_with_its_reason() {
     refused(
         &config,
         info,
-        &with("state", "\"iteration\":", "\"iteration\":9999999"),
+        &with("state", "\"mapping_calls\":", "\"mapping_calls\":200000000"),
         &["counters"],
     );
     refused(&config, info, &with("state", "\"next_id\":1", "\"next_id\":9"), &["odometer"]);

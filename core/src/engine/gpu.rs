@@ -266,6 +266,11 @@ impl GpuEngine {
 
     /// Reports what callbacks have left.
     fn check_failures(&self) -> Result<(), EngineError> {
+        if oneshot::lock(&self.failures).pending.is_some() {
+            // Calls on a lost device are refused as mistakes before its loss is told, which comes
+            // with a poll; what polling says itself is among the failures then.
+            let _ = self.device.poll(wgpu::PollType::Poll);
+        }
         let mut failures = oneshot::lock(&self.failures);
         if let Some(message) = &failures.lost {
             return Err(EngineError::DeviceLost { message: message.clone() });

@@ -142,6 +142,11 @@ impl Slam {
         Ok(())
     }
 
+    /// Iterations of [`Slam::finish`] that are done.
+    pub fn finished_iterations(&self) -> u32 {
+        self.finished_iterations
+    }
+
     /// A part of [`Slam::finish`], after which a checkpoint can be made. Whether more is to be
     /// done. Once all is done further calls do nothing, until another frame has been processed.
     ///
