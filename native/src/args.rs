@@ -2,6 +2,7 @@
 //! what a command does, what it writes, and an example to copy.
 mod recording;
 
+use crate::resume::Invocation;
 pub use recording::{
     ClassArgs, ColorChoice, ConvertArgs, InspectArgs, SelectionArgs, SensorArgs, TargetLayout,
 };
@@ -86,7 +87,8 @@ pub enum Command {
         Examples:\n    \
         mte-slam run data/room0\n    \
         mte-slam run data/rgbd_dataset_freiburg1_desk --preset tum --scale 0.5\n    \
-        mte-slam run data/room0 --frames 100 --set mapping.iterations=20 --seed 7 --out out/try"
+        mte-slam run data/room0 --frames 100 --set mapping.iterations=20 --seed 7 --out out/try\n    \
+        mte-slam run --resume out/try    (after an interruption)"
     )]
     Run(RunArgs),
     /// Compute the figures of an output folder again, from its files and the recording alone
@@ -181,6 +183,17 @@ pub enum Command {
     Shaders(ShadersArgs),
 }
 
+impl Command {
+    /// The output flags of a run.
+    pub fn output_mut(&mut self) -> Option<&mut OutputArgs> {
+        match self {
+            Command::Demo(args) => Some(&mut args.output),
+            Command::Run(args) => Some(&mut args.output),
+            _ => None,
+        }
+    }
+}
+
 /// Which engine computes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum EngineChoice {
@@ -256,14 +269,27 @@ pub struct OutputArgs {
     /// Do not extract a mesh.
     #[arg(long, help_heading = "Output")]
     pub no_mesh: bool,
+    /// Save the run after every N-th frame, and likewise in the last optimisation, so that
+    /// --resume can go on from there; 0 never does.
+    #[arg(long, value_name = "N", default_value_t = 100, help_heading = "Interrupted runs")]
+    pub checkpoint_every: usize,
+    /// Go on with an interrupted run, to the same files as if it had not been interrupted: DIR is
+    /// its output folder, and all else is as it was started; or give it without DIR at the end of
+    /// the same command. With the whole command, a run of which there is nothing yet starts, and
+    /// one that has finished is left alone.
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath, help_heading = "Interrupted runs")]
+    pub resume: Option<Option<PathBuf>>,
+    /// What was typed.
+    #[arg(skip)]
+    pub invocation: Invocation,
 }
 
 /// `run`.
 #[derive(Debug, Args)]
 pub struct RunArgs {
     /// Folder, .zip or .sens of the recording.
-    #[arg(value_name = "DATASET", value_hint = ValueHint::AnyPath)]
-    pub dataset: PathBuf,
+    #[arg(value_name = "DATASET", value_hint = ValueHint::AnyPath, required_unless_present = "resume")]
+    pub dataset: Option<PathBuf>,
     /// Which part of the recording, and how it is read.
     #[command(flatten)]
     pub selection: SelectionArgs,

@@ -13,18 +13,28 @@ mod output;
 mod pipeline;
 mod progress;
 mod record;
+mod resume;
 mod screen;
 mod server;
 mod source;
 
 use args::{Cli, Command};
-use clap::Parser;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    match resume::command_line().and_then(|cli| follow(&cli)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            let usage = error.downcast_ref::<errors::UsageError>().is_some();
+            ExitCode::from(if usage { 2 } else { 1 })
+        }
+    }
+}
+
+fn follow(cli: &Cli) -> anyhow::Result<()> {
     let screen = screen::Screen { quiet: cli.quiet, json: cli.json };
-    let done = match &cli.command {
+    match &cli.command {
         Command::Demo(args) => commands::demo::run(args, screen),
         Command::Run(args) => commands::run::run(args, screen),
         Command::Eval(args) => commands::eval::run(args, screen),
@@ -38,13 +48,5 @@ fn main() -> ExitCode {
         Command::Ablate(args) => commands::ablate::run(args, screen),
         Command::Bench(args) => commands::bench::run(args, screen),
         Command::Shaders(args) => commands::shaders::run(args, screen),
-    };
-    match done {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            let usage = error.downcast_ref::<errors::UsageError>().is_some();
-            ExitCode::from(if usage { 2 } else { 1 })
-        }
     }
 }

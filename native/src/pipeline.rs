@@ -3,7 +3,7 @@ use crate::{
     args::{EngineArgs, OutputArgs},
     class_truth::ClassTruth,
     configuration::{self, Effective},
-    engine,
+    engine::{self, Chosen},
     evaluation::{self, MeshTruth, ViewScores},
     output::{
         checkpoint, classes,
@@ -18,6 +18,7 @@ use crate::{
     },
     progress::Progress,
     record::{RunRecord, config_file},
+    resume::{self, Saved, Saver},
     screen::Screen,
 };
 use anyhow::{Context, Result};
@@ -31,7 +32,9 @@ use mte_slam_core::{
     slam::{FrameReport, PoseEstimate, Slam, TrackingStatus, View},
 };
 use pollster::block_on;
+use serde::{Deserialize, Serialize};
 use std::{
+    fs,
     path::{Path, PathBuf},
     sync::OnceLock,
     time::Instant,
@@ -58,15 +61,51 @@ pub struct Job<'a> {
 }
 
 /// Do it.
-pub fn run(job: Job, screen: Screen) -> Result<()> {
+pub fn run(mut job: Job, screen: Screen) -> Result<()> {
+    // Checked before anything takes time.
+    let path = job.output.out.clone().unwrap_or_else(|| job.default_out.clone());
+    let saved = match job.output.resume {
+        None => None,
+        Some(_) => {
+            let hash = configuration::hash(&job.effective.config)?;
+            if resume::is_finished(&path, &job.record, &hash)? {
+                screen.note(&format!("{}: finished before, nothing to do", path.display()));
+                let json = fs::read_to_string(path.join("metrics.json")).unwrap_or_default();
+                screen.result("", &json);
+                return Ok(());
+            }
+            resume::find(&path)?
+        }
+    };
+    let folder = OutputFolder::prepare(&path, job.output.force)?;
+    let chosen = engine::start(job.engine)?;
+    job.record.set_engine(&chosen.record);
+    let frames = saved.as_ref().and_then(Saved::frames);
+    let every = job.output.checkpoint_every;
+    let mut saver = Saver::new(&path, every, &job.record, job.sequence.as_ref(), frames);
+    let metrics = match work(job, &folder, chosen, saved, &mut saver, screen) {
+        Ok(metrics) => metrics,
+        Err(error) => return Err(saver.failed(error)),
+    };
+    folder.publish()?;
+    saver.remove();
+    let table = format!("{}\nwritten to {}\n", metrics.table(), path.display());
+    screen.result(&table, &metrics.to_json()?);
+    Ok(())
+}
+
+/// From the first frame, or the one after those of `saved`, to the staged results.
+fn work(
+    job: Job,
+    folder: &OutputFolder,
+    chosen: Chosen,
+    saved: Option<Saved>,
+    saver: &mut Saver,
+    screen: Screen,
+) -> Result<Metrics> {
     let start = Instant::now();
     let Job { mut sequence, mut record, effective, output, .. } = job;
     let info = sequence.info().clone();
-    // Checked before anything takes time.
-    let path = output.out.clone().unwrap_or(job.default_out);
-    let folder = OutputFolder::prepare(&path, output.force)?;
-    let chosen = engine::start(job.engine)?;
-    record.set_engine(&chosen.record);
     screen.note(&format!(
         "{}: {} frames of {}x{} ({}), {} classes; {}",
         info.name,
@@ -80,14 +119,35 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
     for warning in sequence.warnings() {
         screen.note(&format!("note: {warning}"));
     }
-    let mut slam = block_on(Slam::new(chosen.engine, effective.config.clone(), &info))
-        .context("the map cannot be set up")?;
+    let (mut slam, begun) = match saved {
+        None => {
+            let slam = block_on(Slam::new(chosen.engine, effective.config.clone(), &info))
+                .context("the map cannot be set up")?;
+            (slam, Processed::default())
+        }
+        Some(saved) => {
+            let (slam, begun) =
+                saved.resume(chosen.engine, &effective.config, sequence.as_mut(), &record)?;
+            screen.note(&format!("resumed after {} of {} frames", slam.next_frame(), info.frames));
+            (slam, begun)
+        }
+    };
+    for note in &begun.notes {
+        screen.note(&format!("note: {note}"));
+    }
+    if saver.begin(&output.invocation)? {
+        screen
+            .note("note: an interrupted run was left here, which --resume would have gone on with");
+    }
     slam.set_clock(clock_s);
 
     let mut progress = screen.progress("tracking and mapping", info.frames);
-    let processed = process(&mut slam, sequence.as_mut(), &record.dataset, &mut progress)?;
+    let saving = Some(&mut *saver);
+    let processed =
+        process(&mut slam, sequence.as_mut(), &record.dataset, begun, saving, &mut progress)?;
     progress.finish();
-    let (timings, labelled) = (processed.timings, slam.labelled());
+    let labelled = slam.labelled();
+    let Processed { timings, earlier_s, notes, .. } = processed;
     record.colour_scale = slam.colour_registration().scale;
     // Without a single label the map's classes mean nothing: none are shown.
     let of_map = shown_classes(&slam);
@@ -104,8 +164,8 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
     metrics.lost_frames =
         estimates.iter().filter(|e| e.status == TrackingStatus::Lost).map(|e| e.frame).collect();
 
-    write_anchors(&slam, &folder, &mut metrics)?;
-    write_trajectory(&folder, sequence.as_ref(), &estimates, &truth, &mut metrics)?;
+    write_anchors(&slam, folder, &mut metrics)?;
+    write_trajectory(folder, sequence.as_ref(), &estimates, &truth, &mut metrics)?;
     let class_truth = if labelled || info.classes.is_empty() {
         job.class_truth
     } else {
@@ -115,10 +175,10 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
     if output.render_every > 0 {
         let chosen: Vec<_> = estimates.iter().step_by(output.render_every).copied().collect();
         let sequence = sequence.as_mut();
-        render_views(&mut slam, sequence, &folder, &chosen, &of_map, &mut scores, screen)?;
+        render_views(&mut slam, sequence, folder, &chosen, &of_map, &mut scores, screen)?;
     }
     scores.report(pictures::unlabelled_id(&info.classes), &mut metrics);
-    write_classes(&folder, &of_map, &scores, &metrics)?;
+    write_classes(folder, &of_map, &scores, &metrics)?;
     if output.no_mesh {
         metrics.absent.insert("mesh", "--no-mesh was given".to_owned());
     } else {
@@ -149,14 +209,14 @@ pub fn run(job: Job, screen: Screen) -> Result<()> {
     record.config_hash = configuration::hash(&effective.config)?;
     folder.write("config.toml", config_file(&effective.config, &record)?.as_bytes())?;
 
-    metrics.warnings.splice(0..0, sequence.warnings());
-    metrics.time = Some(time_figures(&timings, start));
+    metrics.warnings.splice(0..0, sequence.warnings().into_iter().chain(notes));
+    let mut time = time_figures(&timings, start);
+    time.wall_s += earlier_s;
+    time.checkpoints = saver.figures();
+    metrics.time = Some(time);
     metrics.memory = Some(memory_figures(slam.memory_bytes() as u64));
-    let json = metrics.to_json()?;
-    folder.write("metrics.json", json.as_bytes())?;
-    folder.publish()?;
-    screen.result(&format!("{}\nwritten to {}\n", metrics.table(), path.display()), &json);
-    Ok(())
+    folder.write("metrics.json", metrics.to_json()?.as_bytes())?;
+    Ok(metrics)
 }
 
 /// Seconds since the first call, for the reports of the core (which has no clock of its own).
@@ -182,28 +242,44 @@ pub fn shown_classes(slam: &Slam) -> ClassTable {
 }
 
 /// What [`process`] tells.
+#[derive(Default, Serialize, Deserialize)]
 pub struct Processed {
     /// What each frame cost.
     pub timings: Vec<Timing>,
     /// Time of the last optimisation, over all keyframes \[s\].
     pub finish_s: f64,
+    /// Time of the run before it was resumed \[s\].
+    pub earlier_s: f64,
+    /// What is to be said about resumptions.
+    pub notes: Vec<String>,
 }
 
-/// Feed every frame, then optimise once more; a step of `progress` a frame.
+/// Feed every frame after those that `begun` tells of, then optimise once more; a step of
+/// `progress` a frame. `saver` writes checkpoints.
 pub fn process(
     slam: &mut Slam,
     sequence: &mut dyn Sequence,
     recording: &str,
+    begun: Processed,
+    mut saver: Option<&mut Saver>,
     progress: &mut Progress,
 ) -> Result<Processed> {
     let frames = sequence.info().frames;
-    let mut timings = Vec::with_capacity(frames);
-    for index in 0..frames {
-        let frame = sequence.frame(index).with_context(|| recording.to_owned())?;
+    let mut so_far = begun;
+    for index in so_far.timings.len()..frames {
+        let frame = match sequence.frame(index) {
+            Ok(frame) => frame,
+            Err(error) => {
+                if let Some(saver) = &mut saver {
+                    saver.before_failure(slam, &so_far, progress);
+                }
+                return Err(error).with_context(|| recording.to_owned());
+            }
+        };
         let begin = Instant::now();
         let report = block_on(slam.process(&frame))
             .with_context(|| format!("frame {} (index {index})", frame.number))?;
-        timings.push(Timing {
+        so_far.timings.push(Timing {
             frame: index,
             tracking_s: report.tracking_s,
             // Without mapping the core's clock still sees some nanoseconds.
@@ -216,10 +292,27 @@ pub fn process(
             let message = live_message(slam, sequence, &report);
             progress.set(done, || message);
         }
+        if let Some(saver) = &mut saver {
+            saver.after_frame(slam, &so_far, frames, progress)?;
+        }
     }
-    let begin = Instant::now();
-    block_on(slam.finish()).context("the last optimisation failed")?;
-    Ok(Processed { timings, finish_s: begin.elapsed().as_secs_f64() })
+    let mut parts = 0;
+    loop {
+        let begin = Instant::now();
+        let before = slam.finished_iterations();
+        let more = block_on(slam.finish_step()).context("the last optimisation failed")?;
+        so_far.finish_s += begin.elapsed().as_secs_f64();
+        parts += 1;
+        // Of a run that was resumed after all this, nothing is new.
+        if slam.finished_iterations() > before
+            && let Some(saver) = &mut saver
+        {
+            saver.after_part(slam, &so_far, (parts, more), progress)?;
+        }
+        if !more {
+            return Ok(so_far);
+        }
+    }
 }
 
 fn live_message(slam: &Slam, sequence: &dyn Sequence, report: &FrameReport) -> String {
@@ -239,7 +332,8 @@ fn live_message(slam: &Slam, sequence: &dyn Sequence, report: &FrameReport) -> S
     parts.join("  ")
 }
 
-fn status_name(status: TrackingStatus) -> &'static str {
+/// As timings.csv has it.
+pub fn status_name(status: TrackingStatus) -> &'static str {
     match status {
         TrackingStatus::First => "first",
         TrackingStatus::Tracked => "tracked",
@@ -480,6 +574,7 @@ fn time_figures(timings: &[Timing], start: Instant) -> TimeFigures {
         mapping: Spread::of(timings.iter().map(|t| t.mapping_s).filter(|s| *s > 0.0)),
         total: Spread::of(timings.iter().map(|t| t.total_s)),
         wall_s: start.elapsed().as_secs_f64(),
+        checkpoints: None,
     }
 }
 

@@ -227,6 +227,12 @@ impl GpuEngine {
         self.check_failures()
     }
 
+    /// See [`Engine::breaker`](super::Engine::breaker).
+    pub(super) fn breaker(&self) -> alloc::boxed::Box<dyn Fn()> {
+        let device = self.device.clone();
+        alloc::boxed::Box::new(move || device.destroy())
+    }
+
     /// See [`Engine::info`](super::Engine::info).
     pub fn info(&self) -> EngineInfo {
         self.info.clone()
@@ -260,6 +266,11 @@ impl GpuEngine {
 
     /// Reports what callbacks have left.
     fn check_failures(&self) -> Result<(), EngineError> {
+        if oneshot::lock(&self.failures).pending.is_some() {
+            // Calls on a lost device are refused as mistakes before its loss is told, which comes
+            // with a poll; what polling says itself is among the failures then.
+            let _ = self.device.poll(wgpu::PollType::Poll);
+        }
         let mut failures = oneshot::lock(&self.failures);
         if let Some(message) = &failures.lost {
             return Err(EngineError::DeviceLost { message: message.clone() });

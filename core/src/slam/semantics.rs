@@ -11,7 +11,7 @@ const MAX_CLASS_WEIGHT: f64 = 10.0;
 
 /// How often each class was seen, over all mapped frames.
 #[derive(Clone, Debug, Default)]
-pub(super) struct ClassCounts(Vec<f64>);
+pub(super) struct ClassCounts(pub Vec<f64>);
 
 impl ClassCounts {
     /// Adds a frame's labels.
@@ -48,7 +48,7 @@ impl Slam {
     /// Whether any pixel that the map has learnt from had a class; without, its classes mean
     /// nothing.
     pub fn labelled(&self) -> bool {
-        self.restored_labels || self.class_counts.any()
+        self.class_counts.any()
     }
 
     /// Weight of the compression loss by stage: features must have settled before they are held.

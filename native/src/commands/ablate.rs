@@ -16,7 +16,7 @@ use crate::{
         metrics::Metrics,
         pictures,
     },
-    pipeline,
+    pipeline::{self, Processed},
     progress::{Progress, clock},
     screen::Screen,
 };
@@ -342,7 +342,14 @@ fn run_one(
     let mut slam = block_on(Slam::new(chosen.engine, planned.config.clone(), &info))
         .context("the map cannot be set up")?;
     slam.set_clock(pipeline::clock_s);
-    let processed = pipeline::process(&mut slam, sequence, &planned.key.dataset, progress)?;
+    let processed = pipeline::process(
+        &mut slam,
+        sequence,
+        &planned.key.dataset,
+        Processed::default(),
+        None,
+        progress,
+    )?;
     let estimates = slam.trajectory();
     let truth: Vec<_> = estimates.iter().map(|e| sequence.truth(e.frame)).collect();
 

@@ -1,6 +1,7 @@
 //! `mte-slam run`.
 use crate::{
     args::RunArgs,
+    errors::usage,
     evaluation::MeshTruth,
     input::{self, Prepared},
     pipeline::{self, Job},
@@ -11,11 +12,14 @@ use std::path::Path;
 
 /// Run SLAM on a recording.
 pub fn run(args: &RunArgs, screen: Screen) -> Result<()> {
+    let Some(dataset) = &args.dataset else {
+        usage!("found no DATASET, expected the folder of the recording, or --resume DIR alone");
+    };
     let Prepared { sequence, effective, class_truth, record } =
-        input::prepare(&args.dataset, &args.selection, &args.config, screen)?;
-    let name = input::folder_name(&args.dataset);
+        input::prepare(dataset, &args.selection, &args.config, screen)?;
+    let name = input::folder_name(dataset);
     let default_out = Path::new("out").join(format!("{name}-{}", effective.preset));
-    let truth_mesh = MeshTruth::find(args.mesh.as_deref(), &args.dataset)?;
+    let truth_mesh = MeshTruth::find(args.mesh.as_deref(), dataset)?;
     let job = Job {
         sequence,
         record,

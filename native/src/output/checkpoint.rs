@@ -1,7 +1,11 @@
 //! `checkpoint.safetensors`: the map as a file.
 use anyhow::{Context, Result};
 use mte_slam_core::slam::Checkpoint;
-use std::path::Path;
+use std::{
+    fs::{self, File},
+    io::{self, Write},
+    path::Path,
+};
 
 /// Read `OUT/checkpoint.safetensors`.
 pub fn read_file(path: &Path) -> Result<Checkpoint> {
@@ -10,6 +14,35 @@ pub fn read_file(path: &Path) -> Result<Checkpoint> {
     })?;
     Checkpoint::from_bytes(&bytes)
         .with_context(|| format!("{}: not a whole checkpoint", path.display()))
+}
+
+/// Write a checkpoint so that, whatever happens, either the old file or the new one is there,
+/// whole. Returns its size \[bytes\].
+pub fn write_file(path: &Path, checkpoint: &Checkpoint) -> Result<usize> {
+    let temporary = path.with_extension("tmp");
+    let written = write_and_sync(&temporary, path, checkpoint);
+    if written.is_err() {
+        let _ = fs::remove_file(&temporary);
+    }
+    written.with_context(|| format!("{}: the checkpoint cannot be written", path.display()))
+}
+
+fn write_and_sync(temporary: &Path, path: &Path, checkpoint: &Checkpoint) -> io::Result<usize> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder)?;
+    let mut file = File::create(temporary)?;
+    let mut bytes = 0;
+    for part in checkpoint.parts() {
+        file.write_all(&part)?;
+        bytes += part.len();
+    }
+    // A rename that reaches the disk before the data would leave an empty file after a power cut.
+    file.sync_all()?;
+    drop(file);
+    fs::rename(temporary, path)?;
+    #[cfg(unix)]
+    File::open(folder)?.sync_all()?;
+    Ok(bytes)
 }
 
 #[cfg(test)]

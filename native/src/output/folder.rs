@@ -11,8 +11,11 @@ use std::{
 };
 
 const STAGING: &str = ".partial";
-/// Files that mark a folder as one of ours.
-const MARKERS: [&str; 2] = ["metrics.json", "config.toml"];
+/// What an interrupted run goes on from.
+const RESUME: &str = crate::resume::FOLDER;
+/// Files that mark a folder as one of ours; results of a run that was killed while they were put in
+/// place lie beside what it goes on from.
+const MARKERS: [&str; 3] = ["metrics.json", "config.toml", RESUME];
 /// What a run writes, and therefore what a new run in the same folder takes away first, so that
 /// no file of the old run stays beside files of the new one. `metrics.json` is renamed last.
 const OURS: [&str; 18] = [
@@ -62,7 +65,7 @@ impl OutputFolder {
                 let name = entry.with_context(|| unwritable(path))?.file_name();
                 let name = name.to_string_lossy().into_owned();
                 marked |= MARKERS.contains(&name.as_str());
-                if name != STAGING {
+                if name != STAGING && name != RESUME {
                     others.push(name);
                 }
             }
@@ -238,5 +241,16 @@ mod tests {
         folder.write("metrics.json", b"{}").unwrap();
         folder.publish().unwrap();
         assert_eq!(sorted_entries(root.path()).unwrap(), ["metrics.json", "thesis.tex"]);
+    }
+
+    #[test]
+    fn a_run_killed_while_publishing_can_publish_again() {
+        let root = tempfile::tempdir().unwrap();
+        fs::create_dir(root.path().join(RESUME)).unwrap();
+        fs::write(root.path().join("anchors.svg"), b"x").unwrap();
+        let folder = OutputFolder::prepare(root.path(), false).unwrap();
+        folder.write("metrics.json", b"{}").unwrap();
+        folder.publish().unwrap();
+        assert!(root.path().join(RESUME).is_dir(), "the resumption's to remove");
     }
 }

@@ -1,6 +1,7 @@
 //! `metrics.json`: every figure with its unit in the key and its protocol beside it, and the table
 //! that people read at the end of a run.
 use super::timings::Spread;
+use crate::resume::SavingFigures;
 use mte_slam_core::{
     classes::{Class, ClassTable},
     device::AnchorCounts,
@@ -283,8 +284,12 @@ pub struct TimeFigures {
     pub mapping: Spread,
     /// Both and what is between them.
     pub total: Spread,
-    /// The whole program, with loading, evaluation and mesh.
+    /// The whole program, with loading, evaluation and mesh; where a run was resumed, with the time
+    /// until the checkpoint it was resumed from.
     pub wall_s: f64,
+    /// What saving the run cost, where it was saved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub checkpoints: Option<SavingFigures>,
 }
 
 /// Memory.

@@ -1,8 +1,9 @@
 //! `timings.csv`: what each frame cost.
+use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 
 /// One frame.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Timing {
     /// Frame index.
     pub frame: usize,
@@ -13,6 +14,7 @@ pub struct Timing {
     /// Seconds of the whole frame, without decoding its images.
     pub total_s: f64,
     /// `first`, `tracked` or `lost`.
+    #[serde(skip)]
     pub status: &'static str,
 }
 
@@ -30,7 +32,7 @@ pub fn write_csv(timings: &[Timing]) -> String {
 }
 
 /// Median, 95th percentile and mean of a list of seconds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     /// Median \[s\].
     pub median_s: f64,

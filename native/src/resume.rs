@@ -1,0 +1,530 @@
+//! Checkpoints of a run while it runs, and going on from the last one.
+//!
+//! They live in `OUT/.resume`, beside the staging folder that a killed run loses: `command.json`
+//! (what was typed, and where) and `checkpoint.safetensors`, which a newer one replaces as a whole.
+//! A finished run removes the folder after its results are in place.
+use crate::{
+    args::Cli,
+    errors::usage,
+    output::{checkpoint, folder::replace_file},
+    pipeline::{Processed, status_name},
+    progress::Progress,
+    record::{self, RunRecord},
+};
+use anyhow::{Context, Result, bail};
+use clap::Parser;
+use mte_slam_core::{
+    config::Config,
+    engine::{Engine, EngineError},
+    hash::Hasher,
+    sequence::Sequence,
+    slam::{Checkpoint, Slam, SlamError},
+};
+use pollster::block_on;
+use serde::{Deserialize, Serialize};
+use std::{
+    fmt, fs,
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+/// Where checkpoints lie in an output folder.
+pub const FOLDER: &str = ".resume";
+const CHECKPOINT: &str = "checkpoint.safetensors";
+const COMMAND: &str = "command.json";
+/// Metadata entry of what this program keeps beside the core's state.
+const HOST: &str = "run";
+/// Parts of the last optimisation (of 20 iterations) between checkpoints, at most.
+const PARTS: usize = 10;
+
+/// A command line, so that `--resume OUT` can repeat it.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Invocation {
+    arguments: Vec<String>,
+    /// Working directory, which relative paths start from.
+    folder: PathBuf,
+}
+
+impl Invocation {
+    /// Of this process; empty where an argument is not Unicode, and cannot be kept as JSON.
+    fn here() -> Invocation {
+        let arguments: Result<Vec<String>, _> =
+            std::env::args_os().skip(1).map(std::ffi::OsString::into_string).collect();
+        Invocation {
+            arguments: arguments.unwrap_or_default(),
+            folder: std::env::current_dir().unwrap_or_default(),
+        }
+    }
+
+    /// The folder, when this is `run --resume DIR` and nothing else that matters.
+    fn only_resumes(&self) -> Option<&str> {
+        let quiet = ["-q", "--quiet", "--json"];
+        let rest: Vec<&str> =
+            self.arguments.iter().map(String::as_str).filter(|a| !quiet.contains(a)).collect();
+        match rest[..] {
+            [_, "--resume", dir] => Some(dir),
+            [_, flag] => flag.strip_prefix("--resume="),
+            _ => None,
+        }
+    }
+}
+
+/// The command line of this process, or the one that `--resume DIR` stands for.
+pub fn command_line() -> Result<Cli> {
+    let mut cli = Cli::parse();
+    let invocation = Invocation::here();
+    let Some(output) = cli.command.output_mut() else { return Ok(cli) };
+    let dir = output.resume.take_if(|r| r.is_some()).flatten();
+    let Some(dir) = dir else {
+        output.invocation = invocation;
+        return Ok(cli);
+    };
+    if invocation.only_resumes().is_none() {
+        // With the whole command line, DIR is its output folder.
+        if output.out.as_ref().is_some_and(|out| *out != dir) {
+            usage!("--resume {}: found --out with another folder, expected one", dir.display());
+        }
+        output.out = Some(dir);
+        output.resume = Some(None);
+        output.invocation = invocation;
+        return Ok(cli);
+    }
+    let path = dir.join(FOLDER).join(COMMAND);
+    if !path.is_file() {
+        usage!(
+            "--resume {0}: found no interrupted run ({1}), expected the output folder of one. If \
+             it has finished, there is nothing to do.",
+            dir.display(),
+            path.display()
+        );
+    }
+    let name = path.display().to_string();
+    let text = fs::read_to_string(&path).with_context(|| format!("{name}: cannot be read"))?;
+    let kept: Invocation =
+        serde_json::from_str(&text).with_context(|| format!("{name}: not a command line"))?;
+    let advice = "repeat the whole command with --resume at its end";
+    if kept.arguments.is_empty() {
+        bail!("{name}: the command line is not Unicode and was not kept: {advice}");
+    }
+    let program = std::iter::once("mte-slam".to_owned());
+    let mut first = Cli::try_parse_from(program.chain(kept.arguments.iter().cloned()))
+        .map_err(|e| anyhow::anyhow!("{name}: {e}{advice}"))?;
+    let out = dir.canonicalize().with_context(|| format!("{}: no such folder", dir.display()))?;
+    std::env::set_current_dir(&kept.folder).with_context(|| {
+        format!("{}: the run was started there: {advice}", kept.folder.display())
+    })?;
+    let Some(output) = first.command.output_mut() else {
+        bail!("{name}: found a command that makes no run");
+    };
+    (output.out, output.resume, output.invocation) = (Some(out), Some(None), kept);
+    (first.quiet, first.json) = (cli.quiet, cli.json);
+    Ok(first)
+}
+
+/// What this program keeps in a checkpoint.
+#[derive(Serialize, Deserialize)]
+struct Host {
+    record: RunRecord,
+    /// Of all time stamps and true poses.
+    sequence_hash: String,
+    processed: Processed,
+    wall_s: f64,
+}
+
+/// An interrupted run.
+pub struct Saved {
+    path: PathBuf,
+    checkpoint: Checkpoint,
+    host: Host,
+}
+
+/// The interrupted run of an output folder, if it got as far as a checkpoint.
+pub fn find(out: &Path) -> Result<Option<Saved>> {
+    let path = out.join(FOLDER).join(CHECKPOINT);
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let advice = || no_resumption(&path);
+    let mut checkpoint = checkpoint::read_file(&path).with_context(advice)?;
+    let host = checkpoint.metadata.remove(HOST);
+    let host = host.context("found a checkpoint that no run wrote").with_context(advice)?;
+    let host = serde_json::from_str(&host)
+        .context("found a checkpoint of another version of this program")
+        .with_context(advice)?;
+    Ok(Some(Saved { path: path.clone(), checkpoint, host }))
+}
+
+fn no_resumption(path: &Path) -> String {
+    format!("{}: the run cannot be resumed; without --resume it starts anew", path.display())
+}
+
+/// Whether the folder holds the finished run that was asked for. One of another kind is an error.
+pub fn is_finished(out: &Path, record: &RunRecord, config_hash: &str) -> Result<bool> {
+    if out.join(FOLDER).exists() || !out.join("metrics.json").is_file() {
+        return Ok(false);
+    }
+    let Some(found) = record::read_run(out)? else { return Ok(false) };
+    let now = RunRecord { config_hash: config_hash.to_owned(), ..record.clone() };
+    if let Some((field, found, expected)) = difference(&found, &now, true) {
+        usage!(
+            "--resume: {} holds a finished run of another kind: {field}: found {found}, expected \
+             {expected}. Without --resume it is replaced; --out names another folder.",
+            out.display()
+        );
+    }
+    Ok(true)
+}
+
+/// The first entry by which two runs differ: name, of `a`, of `b`. Paths are left to the hashes of
+/// what is there.
+fn difference(
+    a: &RunRecord,
+    b: &RunRecord,
+    config: bool,
+) -> Option<(&'static str, String, String)> {
+    let entries = |r: &RunRecord| {
+        [
+            ("version", r.version.clone()),
+            ("layout", r.layout.clone()),
+            ("start", r.start.to_string()),
+            ("stride", r.stride.to_string()),
+            ("frames", r.frames.to_string()),
+            ("scale", r.scale.to_string()),
+            ("camera", format!("{:?}", r.camera)),
+            ("depth scale", format!("{:?}", r.depth_scale)),
+            ("axes", format!("{:?}", r.axes)),
+            ("feature maps", r.features.is_some().to_string()),
+            ("unlabelled", format!("{:?}", r.unlabelled)),
+            ("preset", r.preset.clone()),
+            ("configuration", if config { r.config_hash.clone() } else { String::new() }),
+        ]
+    };
+    let pairs = entries(a).into_iter().zip(entries(b));
+    { pairs }.find(|(a, b)| a.1 != b.1).map(|(a, b)| (a.0, a.1, b.1))
+}
+
+fn sequence_hash(sequence: &dyn Sequence) -> String {
+    let mut h = Hasher::default();
+    for i in 0..sequence.info().frames {
+        h.word(sequence.time_s(i).to_bits());
+        let truth = sequence.truth(i);
+        h.word(u64::from(truth.is_some()));
+        truth.iter().flat_map(|p| p.to_row_major()).for_each(|x| h.word(x.to_bits()));
+    }
+    format!("{:016x}", h.finish())
+}
+
+impl Saved {
+    /// Frames in the checkpoint.
+    pub fn frames(&self) -> Option<usize> {
+        self.checkpoint.frames()
+    }
+
+    /// The run as it was when it was saved, and what it had told so far.
+    pub fn resume(
+        self,
+        engine: Engine,
+        config: &Config,
+        sequence: &mut dyn Sequence,
+        record: &RunRecord,
+    ) -> Result<(Slam, Processed)> {
+        let Saved { path, checkpoint, host } = self;
+        let advice = || no_resumption(&path);
+        if let Some((field, found, expected)) = difference(&host.record, record, false) {
+            usage!("{}: {field}: found a run with {found}, expected {expected}", advice());
+        }
+        if host.sequence_hash != sequence_hash(sequence) {
+            bail!(
+                "{}: data: found a run with other time stamps or true poses than {}",
+                advice(),
+                record.dataset
+            );
+        }
+        let info = sequence.info().clone();
+        let resuming = block_on(Slam::resume(engine, config.clone(), &info, &checkpoint));
+        let mut resuming = resuming.with_context(advice)?;
+        drop(checkpoint);
+        for index in resuming.missing().collect::<Vec<_>>() {
+            let frame = sequence.frame(index).with_context(|| record.dataset.clone())?;
+            resuming.add(&frame).with_context(advice)?;
+        }
+        let slam = resuming.finish().with_context(advice)?;
+        // The reader counts what it meets in label images, for its warnings.
+        if !info.classes.is_empty() {
+            for index in 0..slam.next_frame() {
+                sequence.labels(index).with_context(|| record.dataset.clone())?;
+            }
+        }
+        let mut processed = host.processed;
+        if processed.timings.len() != slam.next_frame() {
+            bail!("{}: found times of {} frames", advice(), processed.timings.len());
+        }
+        for (timing, estimate) in processed.timings.iter_mut().zip(slam.trajectory()) {
+            timing.status = status_name(estimate.status);
+        }
+        processed.earlier_s = host.wall_s;
+        let engine = |r: &RunRecord| (r.engine.clone(), r.adapter.clone(), r.backend.clone());
+        if engine(&host.record) != engine(record) {
+            processed.notes.push(format!(
+                "resumed after frame {} on another engine ({} {} instead of {} {}): rounding \
+                 differs from an uninterrupted run",
+                slam.next_frame(),
+                record.engine,
+                record.adapter,
+                host.record.engine,
+                host.record.adapter
+            ));
+        }
+        Ok((slam, processed))
+    }
+}
+
+/// What checkpoints cost.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct SavingFigures {
+    /// How many were written since the last start.
+    pub count: usize,
+    /// Size of the last one.
+    pub bytes: usize,
+    /// Mean time of reading the device's state back, writing it and waiting for the disk \[s\].
+    pub mean_s: f64,
+}
+
+/// Writes checkpoints.
+pub struct Saver {
+    out: PathBuf,
+    every: usize,
+    record: RunRecord,
+    sequence_hash: String,
+    start: Instant,
+    /// Whether the run is under way: what fails before that changes nothing.
+    begun: bool,
+    /// Frames that the last checkpoint holds.
+    saved: Option<usize>,
+    seconds: f64,
+    figures: SavingFigures,
+}
+
+impl Saver {
+    /// For a run into `out`. `resumed`: the frames of the checkpoint that it goes on from.
+    pub fn new(
+        out: &Path,
+        every: usize,
+        record: &RunRecord,
+        sequence: &dyn Sequence,
+        resumed: Option<usize>,
+    ) -> Saver {
+        Saver {
+            out: out.to_owned(),
+            every,
+            record: record.clone(),
+            sequence_hash: sequence_hash(sequence),
+            start: Instant::now(),
+            begun: false,
+            saved: resumed,
+            seconds: 0.0,
+            figures: SavingFigures::default(),
+        }
+    }
+
+    /// The run begins, or goes on: notes how it was started. What an earlier run has left for
+    /// another one to go on from is gone with that. Whether there was something.
+    pub fn begin(&mut self, invocation: &Invocation) -> Result<bool> {
+        self.begun = true;
+        let stale = self.saved.is_none() && self.folder().join(CHECKPOINT).exists();
+        if self.saved.is_none() {
+            self.remove();
+        }
+        if self.every > 0 {
+            let json = serde_json::to_string(invocation)?;
+            replace_file(&self.folder().join(COMMAND), json.as_bytes())?;
+        }
+        Ok(stale)
+    }
+
+    fn folder(&self) -> PathBuf {
+        self.out.join(FOLDER)
+    }
+
+    /// What checkpoints cost so far, if any was written.
+    pub fn figures(&self) -> Option<SavingFigures> {
+        (self.figures.count > 0).then_some(self.figures)
+    }
+
+    /// Writes a checkpoint when `done` of `frames` frames say so.
+    pub fn after_frame(
+        &mut self,
+        slam: &mut Slam,
+        processed: &Processed,
+        frames: usize,
+        progress: &Progress,
+    ) -> Result<()> {
+        let done = processed.timings.len();
+        if self.every > 0 && (done.is_multiple_of(self.every) || done == frames) {
+            self.save(slam, processed, progress)?;
+        }
+        Ok(())
+    }
+
+    /// Writes a checkpoint when so many parts of the last optimisation, or all, say so.
+    pub fn after_part(
+        &mut self,
+        slam: &mut Slam,
+        processed: &Processed,
+        (parts, more): (usize, bool),
+        progress: &Progress,
+    ) -> Result<()> {
+        if self.every > 0 && (!more || parts.is_multiple_of(self.every.min(PARTS))) {
+            self.save(slam, processed, progress)?;
+        }
+        Ok(())
+    }
+
+    /// Writes a checkpoint because the next frame cannot be read, unless this is so early that
+    /// there is none at all.
+    pub fn before_failure(&mut self, slam: &mut Slam, processed: &Processed, progress: &Progress) {
+        if self.saved.is_some_and(|saved| saved < slam.next_frame()) {
+            // The error that brought us here is the one to report.
+            let _ = self.save(slam, processed, progress);
+        }
+    }
+
+    fn save(&mut self, slam: &mut Slam, processed: &Processed, progress: &Progress) -> Result<()> {
+        let begin = Instant::now();
+        let mut checkpoint = block_on(slam.checkpoint()).context("the run cannot be saved")?;
+        let host = serde_json::json!({
+            "record": self.record,
+            "sequence_hash": self.sequence_hash,
+            "processed": processed,
+            "wall_s": processed.earlier_s + self.start.elapsed().as_secs_f64(),
+        });
+        checkpoint.metadata.insert(HOST.to_owned(), host.to_string());
+        let path = self.folder().join(CHECKPOINT);
+        match checkpoint::write_file(&path, &checkpoint) {
+            Ok(bytes) => {
+                self.saved = Some(slam.next_frame());
+                self.figures.bytes = bytes;
+                self.figures.count += 1;
+                self.seconds += begin.elapsed().as_secs_f64();
+                self.figures.mean_s = self.seconds / self.figures.count as f64;
+            }
+            // A full disk is no reason to lose the run; the checkpoint before is still there.
+            Err(error) => progress.note(&format!("note: {error:#}; the run goes on without")),
+        }
+        Ok(())
+    }
+
+    /// The results are in place: nothing is left to resume.
+    pub fn remove(&self) {
+        // What cannot be removed now is replaced by the next run.
+        let _ = fs::remove_dir_all(self.folder());
+    }
+
+    /// The run failed: says where it can be taken up, and leaves nothing where it cannot.
+    pub fn failed(&self, error: anyhow::Error) -> anyhow::Error {
+        if !self.begun {
+            return error;
+        }
+        if self.saved.is_none() {
+            self.remove();
+        }
+        let device = is_device_failure(&error);
+        if !device && self.saved.is_none() {
+            return error;
+        }
+        error.context(Interrupted {
+            device,
+            frames: self.saved,
+            every: self.every,
+            out: self.out.clone(),
+        })
+    }
+}
+
+fn is_device_failure(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| match cause.downcast_ref::<SlamError>() {
+        Some(SlamError::Engine(e)) => e.is_device_failure(),
+        _ => cause.downcast_ref::<EngineError>().is_some_and(EngineError::is_device_failure),
+    })
+}
+
+/// A run stopped half-way. Its cause is the error that this is the context of.
+#[derive(Debug)]
+pub struct Interrupted {
+    /// Whether the device is the cause: a reset of the driver, or no memory left.
+    pub device: bool,
+    /// Frames in the last checkpoint, if there is one.
+    pub frames: Option<usize>,
+    every: usize,
+    out: PathBuf,
+}
+
+impl fmt::Display for Interrupted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let what = if self.device { "the device failed" } else { "the run stopped" };
+        let out = self.out.display();
+        match (self.frames, self.every) {
+            (Some(n), _) => write!(
+                f,
+                "{what}, saved after {n} frames in {out}/{FOLDER}/{CHECKPOINT}; `mte-slam run \
+                 --resume {out}` goes on from there"
+            ),
+            (None, 0) => write!(f, "{what}, with no checkpoint (--checkpoint-every 0)"),
+            (None, every) => write!(f, "{what} before the first checkpoint (after {every} frames)"),
+        }
+    }
+}
+
+impl std::error::Error for Interrupted {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mte_slam_core::synth::{SyntheticOptions, SyntheticSequence};
+
+    fn saver(out: &Path, saved: Option<usize>) -> Saver {
+        let sequence = SyntheticSequence::new(SyntheticOptions::tiny());
+        let mut saver = Saver::new(out, 50, &RunRecord::default(), &sequence, saved);
+        saver.begin(&Invocation::default()).unwrap();
+        saver
+    }
+
+    fn lost() -> anyhow::Error {
+        let message = "Unknown: reset by the driver".to_owned();
+        anyhow::Error::from(SlamError::Engine(EngineError::DeviceLost { message }))
+            .context("frame 123 (index 123)")
+    }
+
+    #[test]
+    fn a_lost_device_names_the_checkpoint() {
+        let out = tempfile::tempdir().unwrap();
+        let error = saver(out.path(), Some(100)).failed(lost());
+        let kind = error.downcast_ref::<Interrupted>().expect("a typed error");
+        assert!(kind.device && kind.frames == Some(100));
+        let message = format!("{error:#}");
+        for part in ["after 100 frames", "--resume", "frame 123", "lost", "reset by the driver"] {
+            assert!(message.contains(part), "{part} in {message}");
+        }
+        let memory = EngineError::OutOfMemory { message: "8 GiB".to_owned() };
+        let error = saver(out.path(), None).failed(SlamError::Engine(memory).into());
+        let message = format!("{error:#}");
+        assert!(message.contains("before the first checkpoint (after 50 frames)"), "{message}");
+        // The mistakes of others stay what they are, until there is something to go on from.
+        let broken = || anyhow::anyhow!("000007.png: not a PNG");
+        assert!(saver(out.path(), None).failed(broken()).downcast_ref::<Interrupted>().is_none());
+        let error = saver(out.path(), Some(7)).failed(broken());
+        assert!(!error.downcast_ref::<Interrupted>().expect("a typed error").device);
+    }
+
+    #[test]
+    fn the_short_form_is_told_from_the_whole_command() {
+        let of = |text: &str| Invocation {
+            arguments: text.split(' ').map(str::to_owned).collect(),
+            folder: PathBuf::new(),
+        };
+        assert_eq!(of("run --resume out").only_resumes(), Some("out"));
+        assert_eq!(of("-q run --resume=out --json").only_resumes(), Some("out"));
+        assert_eq!(of("run --resume out --engine cpu").only_resumes(), None);
+        assert_eq!(of("run room --resume").only_resumes(), None);
+    }
+}
