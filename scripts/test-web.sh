@@ -51,4 +51,4 @@ fi
 cd www
 MTE_SLAM_BIN=$target/debug/mte-slam MTE_SLAM_CONSISTENCY=$target/web/consistency \
     MTE_SLAM_REFERENCE=$target/kernel_outputs.bin \
-    node --test --test-concurrency=1 --test-reporter=spec test/consistency.test.mjs test/page.test.mjs
+    node --test --test-concurrency=1 --test-reporter=spec test/*.test.mjs

@@ -392,6 +392,14 @@ export class Renderer {
     return { triangles, chunks: this.#chunks.size, covered: covered / n, mean, eye: this.#eye().eye, bytes };
   }
 
+  /** Takes the context away as a browser short of memory does, and gives it back. */
+  async loseContext(): Promise<void> {
+    const extension = this.#gl.getExtension("WEBGL_lose_context");
+    extension?.loseContext();
+    await new Promise((resolve) => setTimeout(resolve, 200));
+    extension?.restoreContext();
+  }
+
   draw(): void {
     this.#gl.bindFramebuffer(this.#gl.FRAMEBUFFER, null);
     this.#scene();
