@@ -56,6 +56,19 @@ impl FieldShape {
         Self::exact(Bounds { min: centre - whole * 0.5, max: centre + whole * 0.5 }, config)
     }
 
+    /// A map over exactly `bounds`, which a former map had. `None` when it would take more than
+    /// `max_floats` a set of planes.
+    pub fn restored(bounds: Bounds, config: &FieldConfig, max_floats: usize) -> Option<FieldShape> {
+        let e = bounds.max - bounds.min;
+        let finest = config.geometry_fine_m.min(config.surface_fine_m);
+        let n = e / finest + 2.0;
+        // In floating point, where nothing overflows.
+        let cells = 2.0 * (n.x * n.y + n.x * n.z + n.y * n.z);
+        let held = e.cmpgt(DVec3::ZERO).all() && cells * CHANNELS as f64 <= 4.0 * max_floats as f64;
+        let shape = held.then(|| Self::exact(bounds, config))?;
+        (shape.surface_floats().max(shape.geometry_floats()) <= max_floats).then_some(shape)
+    }
+
     fn exact(bounds: Bounds, config: &FieldConfig) -> FieldShape {
         let extent = bounds.max - bounds.min;
         let cells_m = [

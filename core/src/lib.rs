@@ -15,6 +15,7 @@ pub mod device;
 pub mod engine;
 pub mod field;
 pub mod frame;
+pub mod hash;
 pub mod kernels;
 pub mod keyframe;
 pub mod layout;

@@ -224,6 +224,21 @@ impl Fusion {
     pub fn count(&self) -> usize {
         (self.columns * self.rows) as usize
     }
+
+    /// Floats of one slot's targets.
+    pub(super) fn target_floats(&self) -> usize {
+        self.count() * TARGET_FLOATS
+    }
+
+    /// Steps taken, and the origin of encoded positions.
+    pub(super) fn progress(&self) -> (u32, [f32; 4]) {
+        (self.step, self.origin_m)
+    }
+
+    /// Sets what [`Fusion::progress`] tells.
+    pub(super) fn set_progress(&mut self, step: u32, origin_m: [f32; 4]) {
+        (self.step, self.origin_m) = (step, origin_m);
+    }
 }
 
 /// Columns and rows of the token grid.

@@ -1,13 +1,16 @@
 //! The map's buffers on an engine, and the recordings of one pass over a batch of rays.
 mod fusion;
 mod passes;
+mod state;
 mod suppressor;
 
 pub use fusion::{Fusion, Layer};
+pub(crate) use state::Counters;
 pub use suppressor::{AnchorCounts, Suppressor};
 
 use crate::{
     camera::Camera,
+    classes::UNLABELLED,
     config::{Config, LossConfig},
     engine::{Engine, EngineError},
     field::{FieldShape, decoder_floats, initial_decoders, initial_planes},
@@ -322,14 +325,16 @@ impl Device {
         self.max_rays
     }
 
+    /// Colour and label of a frame's pixels, as slots hold them.
+    pub fn color_words(frame: &Frame) -> Vec<[u8; 4]> {
+        let label = |i: usize| frame.labels.as_ref().map_or(UNLABELLED, |l| l[i]);
+        frame.color.iter().enumerate().map(|(i, c)| [c[0], c[1], c[2], label(i)]).collect()
+    }
+
     /// Puts a frame's images into a slot, and forgets the pose optimiser's state of the slot's former frame.
     pub fn upload_frame(&self, r: &mut Recording, slot: u32, frame: &Frame) {
         let pixels = self.camera.pixels();
-        let mut color = Vec::with_capacity(pixels);
-        for (i, c) in frame.color.iter().enumerate() {
-            let label = frame.labels.as_ref().map_or(255, |l| l[i]);
-            color.push(u32::from_le_bytes([c[0], c[1], c[2], label]));
-        }
+        let color = Device::color_words(frame);
         let depth: Vec<u32> = frame
             .depth
             .chunks(2)

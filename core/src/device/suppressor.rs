@@ -19,7 +19,7 @@ pub struct Suppressor {
     pub anchors: BufferId,
     /// Votes of the matched rays' labels, one float a slot and class.
     pub votes: BufferId,
-    counts: BufferId,
+    pub(super) counts: BufferId,
     config: SuppressorConfig,
 }
 

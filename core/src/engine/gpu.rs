@@ -227,6 +227,12 @@ impl GpuEngine {
         self.check_failures()
     }
 
+    /// See [`Engine::breaker`](super::Engine::breaker).
+    pub(super) fn breaker(&self) -> alloc::boxed::Box<dyn Fn()> {
+        let device = self.device.clone();
+        alloc::boxed::Box::new(move || device.destroy())
+    }
+
     /// See [`Engine::info`](super::Engine::info).
     pub fn info(&self) -> EngineInfo {
         self.info.clone()

@@ -168,6 +168,19 @@ pub enum EngineError {
     },
 }
 
+impl EngineError {
+    /// Whether the device failed, rather than what it was told to do: a new engine, or one with
+    /// more memory, can go on from a checkpoint.
+    pub fn is_device_failure(&self) -> bool {
+        matches!(
+            self,
+            EngineError::OutOfMemory { .. }
+                | EngineError::Internal { .. }
+                | EngineError::DeviceLost { .. }
+        )
+    }
+}
+
 /// What an engine runs on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EngineInfo {
@@ -269,6 +282,17 @@ impl Engine {
             Engine::Cpu(_) => Ok(()),
             #[cfg(feature = "gpu")]
             Engine::Gpu(engine) => engine.synchronise().await,
+        }
+    }
+
+    /// What loses the graphics device, as a driver's reset does: for tests of what comes then.
+    /// `None` on the CPU, which cannot be lost.
+    #[doc(hidden)]
+    pub fn breaker(&self) -> Option<alloc::boxed::Box<dyn Fn()>> {
+        match self {
+            Engine::Cpu(_) => None,
+            #[cfg(feature = "gpu")]
+            Engine::Gpu(engine) => Some(engine.breaker()),
         }
     }
 

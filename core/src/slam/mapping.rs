@@ -18,6 +18,8 @@ use glam::DVec3;
 const OBSERVATION_WIDTH: u32 = 160;
 /// Iterations recorded at once: long enough to amortise, short enough for watchdogs.
 const ITERATIONS_PER_RECORDING: u32 = 4;
+/// Iterations of a part of the last optimisation.
+const FINISH_ITERATIONS: u32 = 20;
 /// Joint pose refinement needs more keyframes than this (NICE-SLAM).
 const REFINE_AFTER: usize = 4;
 /// Stratified samples a ray when semantics are trained alone.
@@ -131,36 +133,48 @@ impl Slam {
         Ok((losses, keyframe))
     }
 
-    /// Goes over all keyframes once more, with falling rates.
+    /// Goes over all keyframes once more, with falling rates: [`Slam::finish_step`] to its end.
     ///
     /// # Errors
     /// Engine failures. Nothing happens without keyframes.
     pub async fn finish(&mut self) -> Result<(), SlamError> {
-        if self.keyframes.is_empty() {
-            return Ok(());
-        }
-        self.follow_odometer();
-        let m = self.config.mapping.clone();
-        let all: Vec<usize> = (0..self.keyframes.len()).collect();
-        for (total, semantic) in [
-            (m.final_iterations, false),
-            (if self.info.classes.is_empty() { 0 } else { m.semantic_iterations }, true),
-        ] {
-            let mut left = total;
-            while left > 0 {
-                let iterations = left.min(20);
-                let factor = 0.1 + 0.9 * f64::from(left) / f64::from(total);
-                let rates =
-                    Rates { planes: m.rate_planes * factor, decoders: m.rate_decoders * factor };
-                let fusion_steps = self.config.fusion.steps * iterations / m.iterations.max(1);
-                let fusion_steps = if semantic { fusion_steps / 4 } else { fusion_steps };
-                let pass = Pass { iterations, rates, recent: 0, fusion_steps, semantic };
-                self.optimise(&all, pass).await?;
-                left -= iterations;
-            }
-        }
-        self.follow_odometer();
+        while self.finish_step().await? {}
         Ok(())
+    }
+
+    /// A part of [`Slam::finish`], after which a checkpoint can be made. Whether more is to be
+    /// done. Once all is done further calls do nothing, until another frame has been processed.
+    ///
+    /// # Errors
+    /// Engine failures.
+    pub async fn finish_step(&mut self) -> Result<bool, SlamError> {
+        let m = self.config.mapping.clone();
+        let done = self.finished_iterations;
+        let semantics = if self.info.classes.is_empty() { 0 } else { m.semantic_iterations };
+        let semantic = done >= m.final_iterations;
+        let (total, before) =
+            if semantic { (semantics, m.final_iterations) } else { (m.final_iterations, 0) };
+        let left = (before + total).saturating_sub(done);
+        if self.keyframes.is_empty() || left == 0 {
+            return Ok(false);
+        }
+        if done == 0 {
+            self.follow_odometer();
+        }
+        let all: Vec<usize> = (0..self.keyframes.len()).collect();
+        let iterations = left.min(FINISH_ITERATIONS);
+        let factor = 0.1 + 0.9 * f64::from(left) / f64::from(total);
+        let rates = Rates { planes: m.rate_planes * factor, decoders: m.rate_decoders * factor };
+        let fusion_steps = self.config.fusion.steps * iterations / m.iterations.max(1);
+        let fusion_steps = if semantic { fusion_steps / 4 } else { fusion_steps };
+        let pass = Pass { iterations, rates, recent: 0, fusion_steps, semantic };
+        self.optimise(&all, pass).await?;
+        self.finished_iterations += iterations;
+        let more = self.finished_iterations < m.final_iterations + semantics;
+        if !more {
+            self.follow_odometer();
+        }
+        Ok(more)
     }
 
     /// Makes the map, or grows it, so that it holds the points and the camera.

@@ -8,6 +8,7 @@ mod live;
 mod mapping;
 mod output;
 mod parameters;
+mod resume;
 mod semantics;
 mod tracking;
 
@@ -18,6 +19,7 @@ pub use checkpoint::{Checkpoint, Dtype, Tensor};
 pub use live::{LiveMesh, MeshChunk};
 pub use output::View;
 pub use parameters::ParameterCounts;
+pub use resume::Resuming;
 
 use crate::{
     config::{Config, ConfigError, Tracker},
@@ -161,16 +163,26 @@ pub struct Slam {
     odometer: Odometer,
     /// Where the colours of the images on the device have been found to lie.
     registration: ColourRegistration,
+    /// The changes of `registration`: from which frame on it was in force.
+    registrations: Vec<(usize, ColourRegistration)>,
     frames: Vec<PoseEstimate>,
+    /// [`Frame::content_hash`] of each frame.
+    hashes: Vec<u64>,
     keyframes: Vec<Keyframe>,
     observations: Vec<Observation>,
     free_slots: Vec<u32>,
+    /// Slots from here on have never held a frame.
+    used_slots: u32,
     /// Batches so far: the counter of the random numbers.
     iteration: u32,
     bounds_refused: bool,
     class_counts: semantics::ClassCounts,
     mapping_calls: u32,
+    /// Iterations of [`Slam::finish`] that are done.
+    finished_iterations: u32,
     anchor_history: Vec<(usize, AnchorCounts)>,
+    /// Restored without odometry and images: takes no frames.
+    only_shown: bool,
     clock: Option<fn() -> f64>,
 }
 
@@ -187,24 +199,35 @@ impl Slam {
         config: Config,
         info: &SequenceInfo,
     ) -> Result<Slam, SlamError> {
+        let mut slam = Slam::without_engine(config, info)?;
+        slam.engine = Some(engine);
+        Ok(slam)
+    }
+
+    fn without_engine(config: Config, info: &SequenceInfo) -> Result<Slam, SlamError> {
         config.validate()?;
         Ok(Slam {
             config,
             breathe: None,
             info: info.clone(),
-            engine: Some(engine),
+            engine: None,
             device: None,
             odometer: Odometer::new(OdometryConfig::default()),
             registration: ColourRegistration::default(),
+            registrations: Vec::new(),
             frames: Vec::new(),
+            hashes: Vec::new(),
             keyframes: Vec::new(),
             observations: Vec::new(),
             free_slots: Vec::new(),
+            used_slots: 0,
             iteration: 0,
             bounds_refused: false,
             class_counts: semantics::ClassCounts::default(),
             mapping_calls: 0,
+            finished_iterations: 0,
             anchor_history: Vec::new(),
+            only_shown: false,
             clock: None,
         })
     }
@@ -227,9 +250,20 @@ impl Slam {
     /// cannot be located is no error: its status is [`TrackingStatus::Lost`].
     pub async fn process(&mut self, frame: &Frame) -> Result<FrameReport, SlamError> {
         self.check(frame)?;
+        if self.only_shown {
+            return Err(SlamError::Frame {
+                frame: frame.index,
+                field: "map",
+                found: "one that was restored to be shown".into(),
+                expected: "a run, new or resumed".into(),
+            });
+        }
+        let hash = frame.content_hash();
+        self.finished_iterations = 0;
         let now = |s: &Slam| s.clock.map_or(0.0, |c| c());
         let start = now(self);
         let (status, new_reference) = self.track(frame).await?;
+        self.hashes.push(hash);
         let tracked = now(self);
         let due = frame.index.is_multiple_of(self.config.mapping.every as usize);
         let mut losses = None;
@@ -271,11 +305,12 @@ impl Slam {
     /// after some keyframes; the images of those before are still on the device, so they are read
     /// back, resampled and stored again. What the map has already learnt from them fades as later
     /// iterations draw from the corrected images.
-    pub(super) async fn follow_registration(&mut self) -> Result<(), SlamError> {
+    pub(super) async fn follow_registration(&mut self, frame: usize) -> Result<(), SlamError> {
         let found = self.odometer.colour_registration();
         if found == self.registration {
             return Ok(());
         }
+        self.registrations.push((frame, found));
         // The stored images have the former registration applied.
         let change = ColourRegistration { scale: found.scale / self.registration.scale };
         self.registration = found;

@@ -13,7 +13,7 @@ const MAX_CLASS_WEIGHT: f64 = 10.0;
 
 /// How often each class was seen, over all mapped frames.
 #[derive(Clone, Debug, Default)]
-pub(super) struct ClassCounts(Vec<f64>);
+pub(super) struct ClassCounts(pub Vec<f64>);
 
 impl ClassCounts {
     /// Adds a frame's labels.

@@ -104,3 +104,44 @@ fn the_map_gets_its_colours_where_the_odometer_found_them() {
     assert!(after > before + 5.0 && compared > before + 5.0);
     assert!(as_trained > as_recorded + 3.0);
 }
+
+#[test]
+fn a_run_goes_on_from_its_checkpoint_with_the_colours_it_had_found() {
+    let mut room = Unregistered::new();
+    let mut config = Config::preset("fast").unwrap();
+    config.mapping.rays = 200;
+    (config.mapping.first_iterations, config.mapping.iterations) = (20, 2);
+    (config.mapping.final_iterations, config.field.use_given_bounds) = (2, false);
+    room.info.classes = Default::default();
+    let frames: Vec<Frame> = (0..12).map(|i| room.frame(i, 5 * i).0).collect();
+    let mut slam = block_on(Slam::new(Engine::cpu(), config.clone(), &room.info)).unwrap();
+    // Before a registration is known, right after it, and at the end.
+    let mut saved = Vec::new();
+    for frame in &frames {
+        let before = slam.registrations.len();
+        block_on(slam.process(frame)).unwrap();
+        if frame.index == 1 || slam.registrations.len() > before || frame.index == 10 {
+            saved.push(block_on(slam.checkpoint()).unwrap());
+        }
+    }
+    assert!(!slam.registrations.is_empty() && saved.len() >= 3, "{:?}", slam.registrations);
+    block_on(slam.finish()).unwrap();
+    let end = block_on(slam.checkpoint()).unwrap();
+    for checkpoint in saved {
+        let resumed = Slam::resume(Engine::cpu(), config.clone(), &room.info, &checkpoint);
+        let mut resuming = block_on(resumed).unwrap();
+        for index in resuming.missing().collect::<Vec<usize>>() {
+            resuming.add(&frames[index]).unwrap();
+        }
+        let mut again = resuming.finish().unwrap();
+        for frame in &frames[again.next_frame()..] {
+            block_on(again.process(frame)).unwrap();
+        }
+        block_on(again.finish()).unwrap();
+        for k in &again.keyframes.clone() {
+            let stored = |s: &mut Slam| block_on(s.device().unwrap().read_color(k.slot)).unwrap();
+            assert!(stored(&mut slam) == stored(&mut again), "frame {}", k.frame);
+        }
+        assert!(block_on(again.checkpoint()).unwrap() == end);
+    }
+}

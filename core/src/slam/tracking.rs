@@ -55,7 +55,7 @@ impl Slam {
         let pyramid = RgbdPyramid::new(frame, &self.info.camera, self.info.depth_unit_m, &config)?;
         let start = first.then(|| frame.truth.unwrap_or(Pose::IDENTITY));
         let found = self.odometer.track(pyramid, start)?;
-        self.follow_registration().await?;
+        self.follow_registration(frame.index).await?;
         let frame = &*self.registered(frame);
         let mut pose = found.world_from_camera;
         if found.lost {
@@ -159,6 +159,8 @@ impl Slam {
             self.free_slots.push(dropped.slot);
         }
         debug_assert!(!self.free_slots.contains(&VIEW_SLOT));
-        self.free_slots.pop()
+        let slot = self.free_slots.pop()?;
+        self.used_slots = self.used_slots.max(slot + 1);
+        Some(slot)
     }
 }

@@ -23,7 +23,7 @@ pub(super) struct Calibration {
     /// In use.
     pub registration: ColourRegistration,
     /// Keyframes (older, newer) and the pose between them by depth alone.
-    pairs: Vec<(usize, usize, Pose)>,
+    pub pairs: Vec<(usize, usize, Pose)>,
     /// Whether somebody outside corrects poses; then they are not ours to realign.
     pub corrected: bool,
 }

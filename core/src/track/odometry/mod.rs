@@ -14,6 +14,7 @@ mod pose_graph;
 mod pyramid;
 mod registration;
 mod residuals;
+mod saved;
 mod thumbnail;
 
 pub use align::{Alignment, Reference, align, align_many};
@@ -22,6 +23,7 @@ pub use odometer::{Keyframe, LostReason, Odometer, OdometryResult, Quality};
 pub use pose_graph::{Edge, PoseGraph};
 pub use pyramid::RgbdPyramid;
 pub use registration::ColourRegistration;
+pub(crate) use saved::{OdometerState, Rebuild, since};
 
 #[cfg(test)]
 mod tests;

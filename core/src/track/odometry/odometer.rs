@@ -13,6 +13,7 @@ use super::{
 use crate::pose::Pose;
 use alloc::{collections::BTreeMap, vec::Vec};
 use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
 
 /// A frame that others are aligned with.
 #[derive(Clone, Debug)]
@@ -80,12 +81,12 @@ pub struct OdometryResult {
 }
 
 /// Where a tracked frame is: relative to a keyframe, so that it follows corrections.
-#[derive(Clone, Copy, Debug)]
-struct Tracked {
-    frame: usize,
-    keyframe: usize,
-    keyframe_from_camera: Pose,
-    lost: bool,
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(super) struct Tracked {
+    pub frame: usize,
+    pub keyframe: usize,
+    pub keyframe_from_camera: Pose,
+    pub lost: bool,
 }
 
 /// Frame-by-frame RGB-D odometry against keyframes.
@@ -93,15 +94,15 @@ struct Tracked {
 pub struct Odometer {
     pub(super) config: OdometryConfig,
     pub(super) keyframes: Vec<Keyframe>,
-    next_id: usize,
-    last: Option<(RgbdPyramid, Pose)>,
+    pub(super) next_id: usize,
+    pub(super) last: Option<(RgbdPyramid, Pose)>,
     /// `last_from_previous^-1` motion of the last step in the camera frame.
-    velocity: Pose,
-    lost_streak: usize,
-    tracked: Vec<Tracked>,
+    pub(super) velocity: Pose,
+    pub(super) lost_streak: usize,
+    pub(super) tracked: Vec<Tracked>,
     /// Keyframe poses also of dropped keyframes.
     pub(super) poses: BTreeMap<usize, Pose>,
-    edges: Vec<Edge>,
+    pub(super) edges: Vec<Edge>,
     pub(super) calibration: Calibration,
 }
 

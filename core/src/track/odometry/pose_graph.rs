@@ -3,9 +3,10 @@ use super::linear::solve_cholesky;
 use crate::pose::Pose;
 use alloc::{vec, vec::Vec};
 use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
 
 /// A measured relative pose.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Edge {
     /// Index of the reference node.
     pub i: usize,
