@@ -405,10 +405,11 @@ pub struct SavedEvent {
     pub frame: usize,
     /// Number of frames.
     pub frames: usize,
-    /// For the command `open`; also a checkpoint that `mte-slam mesh` and `render` read.
-    #[serde(with = "serde_bytes")]
+    /// For the command `open`; also a checkpoint that `mte-slam mesh` and `render` read. Never as a
+    /// whole in the module's memory, which cannot shrink.
+    #[serde(with = "serde_wasm_bindgen::preserve")]
     #[tsify(type = "Uint8Array")]
-    pub bytes: Vec<u8>,
+    pub bytes: JsValue,
 }
 
 /// Of [`Event::Warning`].

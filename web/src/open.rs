@@ -172,7 +172,6 @@ impl Run {
         run.next = state.next;
         run.begun_s = Some(clock_s() - state.seconds);
         run.finished = state.finished;
-        run.last_frame = state.last_frame;
         run.metrics = state.metrics;
         for figures in &run.metrics {
             emit(&Event::Metrics(figures.clone()));
@@ -195,7 +194,7 @@ impl Run {
         next_turn().await;
         let mut feed = open_feed(source, &settings).await?;
         if let Some(saved) = saved {
-            saved.progress.check(&mut feed, &warn).await?;
+            saved.progress.check(feed.info())?;
         }
         let mut info = feed.info().clone();
         if settings.labels == LabelChoice::None {
@@ -208,7 +207,21 @@ impl Run {
             EngineDescription { kind: found.kind.into(), adapter: found.adapter, why: why.clone() };
         let cpu = found.kind == "cpu";
         let mut slam = match saved {
-            Some(saved) => Slam::restore(engine, &saved.checkpoint).await?,
+            Some(saved) => {
+                let checkpoint = &saved.checkpoint;
+                let mut resuming = Slam::resume(engine, config, &info, checkpoint).await?;
+                let missing: Vec<usize> = resuming.missing().collect();
+                for (i, index) in missing.iter().enumerate() {
+                    progress("reading keyframes again", i as f64, missing.len() as f64);
+                    next_turn().await;
+                    let mut frame = feed.frame(*index, &warn).await?;
+                    if info.classes.is_empty() {
+                        frame.labels = None;
+                    }
+                    resuming.add(&frame)?;
+                }
+                resuming.finish()?
+            }
             None => Slam::new(engine, config, &info).await?,
         };
         slam.set_clock(clock_s);
@@ -253,7 +266,6 @@ impl Run {
             keep: false,
             saved_s: clock_s(),
             save_pause_s: 0.0,
-            last_frame: String::new(),
             settled: true,
         })
     }

@@ -6,7 +6,6 @@ use crate::{
     message::*,
     pack, picture,
     platform::{clock_s, next_turn, wasm_bytes},
-    saved::fingerprint,
     settings::Settings,
 };
 use mte_slam_core::{
@@ -35,8 +34,6 @@ pub struct Run {
     /// When one was saved last, and how long to wait for the next. \[s\]
     pub saved_s: f64,
     pub save_pause_s: f64,
-    /// Fingerprint of the last frame processed.
-    pub last_frame: String,
     /// False from a frame that failed half way on: such a state must not be saved.
     pub settled: bool,
 }
@@ -78,9 +75,6 @@ impl Run {
 
         self.settled = false;
         let report = self.slam.process(&frame).await?;
-        if self.keep {
-            self.last_frame = fingerprint(&frame);
-        }
         drop(frame);
         if report.status == TrackingStatus::Lost {
             emit(&Event::Lost(LostEvent { index }));

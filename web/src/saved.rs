@@ -1,14 +1,10 @@
 //! A run's state, kept now and then, so that a lost device, a crash or a reload costs a few frames:
 //! the core's checkpoint, with what this crate knows of the run in an entry of its metadata.
 use crate::{
-    events::emit, failure::Failure, feed::Feed, message::*, platform::clock_s, run::Run,
-    settings::Settings,
+    events::emit, failure::Failure, message::*, platform::clock_s, run::Run, settings::Settings,
 };
-use mte_slam_core::{
-    camera::Camera,
-    frame::{Frame, SequenceInfo},
-    slam::Checkpoint,
-};
+use js_sys::Uint8Array;
+use mte_slam_core::{camera::Camera, frame::SequenceInfo, slam::Checkpoint};
 use serde::{Deserialize, Serialize};
 
 /// Name of the metadata entry.
@@ -31,8 +27,6 @@ pub struct Progress {
     pub settings: Settings,
     /// The frame that comes next.
     pub next: usize,
-    /// Fingerprint of the last frame processed.
-    pub last_frame: String,
     /// Time from the first frame \[s\].
     pub seconds: f64,
     /// Whether the map has been refined after the last frame.
@@ -69,39 +63,23 @@ impl SavedRun {
 }
 
 impl Progress {
-    /// Whether frames come from the recording that was saved.
+    /// Whether this is the recording that was saved, as far as can be said without its images.
     ///
     /// # Errors
-    /// Says what differs; or the last frame cannot be read.
-    pub async fn check(&self, feed: &mut Feed, notice: &dyn Fn(String)) -> Result<(), Failure> {
-        let SequenceInfo { name, frames, camera, .. } = feed.info().clone();
-        if name != self.name {
+    /// Says what differs.
+    pub fn check(&self, found: &SequenceInfo) -> Result<(), Failure> {
+        let SequenceInfo { name, frames, camera, .. } = found;
+        if *name != self.name {
             return Err(wrong("recording", name, &self.name));
         }
-        if frames != self.frames {
+        if *frames != self.frames {
             return Err(wrong("frames", frames, self.frames));
         }
-        if camera != self.camera {
+        if *camera != self.camera {
             return Err(wrong("camera", camera, self.camera));
-        }
-        let last = self.next - 1;
-        let found = fingerprint(&feed.frame(last, notice).await?);
-        if found != self.last_frame {
-            return Err(wrong(&format!("fingerprint of frame {last}"), found, &self.last_frame));
         }
         Ok(())
     }
-}
-
-/// Tells frames apart: FNV-1a over colour and depth.
-pub fn fingerprint(frame: &Frame) -> String {
-    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-    let mut take = |word: u32| hash = (hash ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3);
-    for ([r, g, b], d) in frame.color.iter().zip(&frame.depth) {
-        take(u32::from_le_bytes([*r, *g, *b, 0]));
-        take((*d).into());
-    }
-    format!("{hash:016x}")
 }
 
 impl Run {
@@ -124,7 +102,6 @@ impl Run {
             camera: info.camera,
             settings: self.settings.clone(),
             next: self.next,
-            last_frame: self.last_frame.clone(),
             seconds: self.seconds(),
             finished: self.finished,
             metrics: self.metrics.clone(),
@@ -134,9 +111,15 @@ impl Run {
         let frames = info.frames;
         let mut checkpoint = self.slam.checkpoint().await?;
         checkpoint.metadata.insert(ENTRY.into(), text);
-        let bytes = checkpoint.to_bytes();
-        drop(checkpoint);
-        emit(&Event::Saved(SavedEvent { frame: self.next, frames, bytes }));
+        let parts = checkpoint.parts();
+        let bytes = Uint8Array::new_with_length(parts.iter().map(|p| p.len() as u32).sum());
+        let mut at = 0;
+        for part in &parts {
+            let end = at + part.len() as u32;
+            bytes.subarray(at, end).copy_from(part);
+            at = end;
+        }
+        emit(&Event::Saved(SavedEvent { frame: self.next, frames, bytes: bytes.into() }));
         self.saved_s = clock_s();
         self.save_pause_s = PAUSE_S.max(SHARE * (self.saved_s - begun_s));
         Ok(())
@@ -146,26 +129,6 @@ impl Run {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn frames_are_told_apart() {
-        let frame = Frame {
-            index: 0,
-            number: 0,
-            time_s: 0.0,
-            color: vec![[1, 2, 3]; 4],
-            depth: vec![1000; 4],
-            labels: None,
-            truth: None,
-        };
-        let mut other = frame.clone();
-        assert_eq!(fingerprint(&frame), fingerprint(&other));
-        other.depth[3] = 1001;
-        assert_ne!(fingerprint(&frame), fingerprint(&other));
-        other.depth[3] = 1000;
-        other.color[0][2] = 4;
-        assert_ne!(fingerprint(&frame), fingerprint(&other));
-    }
 
     #[test]
     fn a_file_that_is_no_saved_run_is_refused() {

@@ -49,8 +49,8 @@ export function executable() {
   return known.find((path) => path && existsSync(path));
 }
 
-/** `gpu: false` starts a browser without WebGPU, `webgl: false` one without WebGL. */
-export async function launch({ gpu = true, webgl = true } = {}) {
+/** `gpu: false` starts a browser without WebGPU. */
+export async function launch({ gpu = true } = {}) {
   const executablePath = executable();
   if (!executablePath) throw new Error("no Chromium found; install it or set MTE_SLAM_CHROMIUM");
   return chromium.launch({
@@ -60,7 +60,6 @@ export async function launch({ gpu = true, webgl = true } = {}) {
       "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
       "--js-flags=--expose-gc",
       ...(gpu ? ["--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"] : ["--disable-features=WebGPU", "--disable-webgpu"]),
-      ...(webgl ? [] : ["--disable-3d-apis"]),
     ],
   });
 }

@@ -124,6 +124,7 @@ test("the 3D view is lost and comes back with the mesh", { timeout: 120_000 }, a
   const before = await stats(page);
   const view = await Promise.all(page.workers().map((w) => w.evaluate(() => "view" in self))).then((all) => page.workers()[all.indexOf(true)]);
   await view.evaluate(() => self.view.loseContext());
+  await page.waitForFunction(() => /3D view is back/.test(document.getElementById("notice").textContent));
   await page.waitForFunction((n) => window.mteSlam.view.stats().then((s) => s.triangles === n), before.triangles, { timeout: 60_000 });
   const after = await stats(page);
   for (const i of [0, 1, 2]) assert.ok(Math.abs(after.mean[i] - before.mean[i]) < 1, `${after.mean}, ${before.mean}`);
