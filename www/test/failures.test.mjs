@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { cpSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { test } from "node:test";
-import { QUICK, dismiss, done, failure, finish, finished, setUp, stats, visit, world } from "./page.mjs";
+import { DIST, QUICK, dismiss, done, failure, finish, finished, setUp, visit, world } from "./page.mjs";
 import { launch } from "./browser.mjs";
 import { files } from "./zip.mjs";
 
@@ -64,11 +64,13 @@ test("without WebGPU: said, and the processor offered", { timeout: 120_000 }, as
 });
 
 test("without WebGL: said, and the mapping goes on", { timeout: 120_000 }, async () => {
-  const before = (page) => page.route(/worker-[^/]*\.js$/, async (route) => {
-    const response = await route.fetch();
-    await route.fulfill({ response, body: `OffscreenCanvas.prototype.getContext = () => null;\n${await response.text()}` });
-  });
-  const page = await visit(`${QUICK}&source=room&frames=2&auto`, { before });
+  // Workers cannot be patched before they start, so the page is served with a view that gets no context.
+  const copy = join(world.scratch, "no-webgl");
+  cpSync(DIST, copy, { recursive: true });
+  const views = files(copy).filter((name) => /worker-[^/]*\.js$/.test(name) && readFileSync(join(copy, name), "utf8").includes("webgl2"));
+  assert.equal(views.length, 1);
+  writeFileSync(join(copy, views[0]), `OffscreenCanvas.prototype.getContext = () => null;\n${readFileSync(join(copy, views[0]), "utf8")}`);
+  const page = await visit(`${QUICK}&source=room&frames=2&auto`, { to: `${world.server.url}/data/no-webgl/` });
   assert.match(await failure(page, "viewer"), /WebGL 2/);
   await page.locator("#failure-actions button", { hasText: "Go on without it" }).click();
   await finished(page);

@@ -54,7 +54,7 @@ export function setUp() {
 }
 
 /** A page that fails the test on errors in it, and on requests to anybody else. */
-export async function visit(query = "", { to = `${world.server.url}/some/where/`, context, width = 1280, height = 800, scheme, before } = {}) {
+export async function visit(query = "", { to = `${world.server.url}/some/where/`, context, width = 1280, height = 800, scheme } = {}) {
   const page = await (context ?? world.browser).newPage({ viewport: { width, height }, colorScheme: scheme });
   page.problems = [];
   page.on("pageerror", (e) => page.problems.push(e.message));
@@ -64,7 +64,6 @@ export async function visit(query = "", { to = `${world.server.url}/some/where/`
   page.on("request", (r) => {
     if (!/^(http:\/\/(localhost|127\.0\.0\.1)[:/]|blob:|data:)/.test(r.url())) page.problems.push(`request to ${r.url()}`);
   });
-  await before?.(page);
   await page.goto(to + (query ? `?${query}` : ""));
   await ready(page);
   return page;
