@@ -32,7 +32,12 @@ target=$(
         CARGO_PROFILE_RELEASE_CODEGEN_UNITS=1 CARGO_PROFILE_RELEASE_PANIC=abort \
         CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS="-C target-feature=+simd128" \
         CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}/web"
-    cargo build --locked --release -p mte-slam-web --target wasm32-unknown-unknown >&2
+    # What runs once a frame at most is made small; the kernels' twins are not.
+    set -- --config profile.release.package.mte-slam-core.opt-level=2
+    for crate in mte-slam-web serde_json zip zune-jpeg image wgpu js-sys serde-wasm-bindgen; do
+        set -- "$@" --config "profile.release.package.$crate.opt-level='s'"
+    done
+    cargo build --locked --release "$@" -p mte-slam-web --target wasm32-unknown-unknown >&2
     echo "$CARGO_TARGET_DIR"
 )
 rm -rf www/pkg

@@ -3,6 +3,8 @@
 # run against the native CPU engine's results, then the page as people use it. Builds what it needs.
 #
 # MTE_SLAM_CHROMIUM         the browser (default: chromium or google-chrome in the usual places)
+# MTE_SLAM_DATA             a folder with room-11 and kitchen-7scenes (default: shared/data in the
+#                           repository or beside it); without it tests with real files are skipped
 # MTE_SLAM_REQUIRE_BROWSER=1  fail, not skip, where there is no browser or no Node
 set -eu
 cd "$(dirname "$0")/.."
@@ -51,4 +53,4 @@ fi
 cd www
 MTE_SLAM_BIN=$target/debug/mte-slam MTE_SLAM_CONSISTENCY=$target/web/consistency \
     MTE_SLAM_REFERENCE=$target/kernel_outputs.bin \
-    node --test --test-concurrency=1 --test-reporter=spec test/consistency.test.mjs test/page.test.mjs
+    node --test --test-concurrency=1 --test-reporter=spec test/*.test.mjs

@@ -4,11 +4,17 @@
 //! Sources are read synchronously (a worker may do that), so the same readers serve the browser and
 //! the command line; the optimisation is cut into slices, between which the worker's own messages
 //! are handled.
+mod events;
+mod export;
+mod failure;
 mod feed;
 pub mod message;
+mod open;
 mod pack;
 pub mod picture;
 mod platform;
+mod run;
+mod saved;
 mod session;
 pub mod settings;
 pub mod source;

@@ -20,6 +20,10 @@ pub enum Command {
     SeekView(ViewCommand),
     /// Make a file; answered by `exported`.
     Export(ExportCommand),
+    /// Emit `saved` now.
+    Save,
+    /// Emit path, pose and the whole mesh again, for a view that has lost them.
+    Refresh,
     /// Free the device and forget everything.
     Dispose,
 }
@@ -36,6 +40,15 @@ pub struct OpenCommand {
     #[serde(default)]
     #[tsify(optional)]
     pub settings: Settings,
+    /// Emit `saved` now and then (at most a twentieth of the time goes into it).
+    #[serde(default)]
+    #[tsify(optional)]
+    pub keep: bool,
+    /// Bytes of a `saved` event: go on from there. The recording must be the same; of the settings
+    /// only `engine` and `unroll` are taken, the rest is as it was.
+    #[serde(default, with = "serde_wasm_bindgen::preserve")]
+    #[tsify(optional, type = "Uint8Array")]
+    pub resume: JsValue,
 }
 
 /// Where frames come from.
@@ -177,6 +190,8 @@ pub enum Event {
     Lost(LostEvent),
     /// A file.
     Exported(ExportedEvent),
+    /// The state of the run, to go on from.
+    Saved(SavedEvent),
     /// Something worth knowing that stops nothing.
     Warning(WarningEvent),
     /// What was asked for could not be done.
@@ -195,6 +210,8 @@ pub struct OpenedEvent {
     pub layout: String,
     /// Number of frames.
     pub frames: usize,
+    /// The frame that comes first: 0, or where a saved run goes on.
+    pub next: usize,
     /// Width of the images \[pixels\].
     pub width: u32,
     /// Height of the images \[pixels\].
@@ -292,7 +309,7 @@ pub struct TrajectoryEvent {
 }
 
 /// Of [`Event::Metrics`].
-#[derive(Serialize, Tsify)]
+#[derive(Clone, Debug, Serialize, Deserialize, Tsify)]
 #[serde(rename_all = "camelCase")]
 pub struct MetricsEvent {
     /// Frame.
@@ -318,7 +335,7 @@ pub struct MetricsEvent {
 }
 
 /// Mean losses, weighted as optimised.
-#[derive(Serialize, Tsify)]
+#[derive(Clone, Debug, Serialize, Deserialize, Tsify)]
 pub struct LossFigures {
     /// Sum of the others.
     pub total: f64,
@@ -379,6 +396,20 @@ pub struct ExportedEvent {
     #[serde(with = "serde_bytes")]
     #[tsify(type = "Uint8Array")]
     pub bytes: Vec<u8>,
+}
+
+/// Of [`Event::Saved`].
+#[derive(Serialize, Tsify)]
+pub struct SavedEvent {
+    /// Frames processed.
+    pub frame: usize,
+    /// Number of frames.
+    pub frames: usize,
+    /// For the command `open`; also a checkpoint that `mte-slam mesh` and `render` read. Never as a
+    /// whole in the module's memory, which cannot shrink.
+    #[serde(with = "serde_wasm_bindgen::preserve")]
+    #[tsify(type = "Uint8Array")]
+    pub bytes: JsValue,
 }
 
 /// Of [`Event::Warning`].

@@ -15,10 +15,12 @@ import type {
   SourceSpec,
   ViewCommand,
 } from "../pkg/mte_slam_web.js";
-import type { WorkerEvent, WorkerMessage } from "./worker";
+import { type KeptRun, forget, kept } from "./keep";
+import type { Keep, WorkerEvent, WorkerMessage } from "./worker";
 
 export type * from "../pkg/mte_slam_web.js";
-export type { WorkerEvent } from "./worker";
+export type { KeptRun } from "./keep";
+export type { Keep, WorkerEvent } from "./worker";
 
 type Named<T extends WorkerEvent["type"]> = Extract<WorkerEvent, { type: T }>;
 type Listener = (event: never) => void;
@@ -29,6 +31,8 @@ export class MteSlam {
   #next = 1;
   #answers = new Map<number, (ok: boolean) => void>();
   #listeners = new Map<string, Set<Listener>>();
+  /** The last state, where the browser's database would not have it. */
+  #held: { id: string; bytes: Uint8Array } | undefined;
 
   constructor() {
     this.#worker = this.#start();
@@ -47,6 +51,7 @@ export class MteSlam {
       this.#answers.get(event.id)?.(event.ok);
       this.#answers.delete(event.id);
     }
+    if (event.type === "saved") this.#held = event.bytes ? { id: event.id, bytes: event.bytes } : undefined;
     if (event.type === "crashed") {
       for (const answer of this.#answers.values()) answer(false);
       this.#answers.clear();
@@ -62,17 +67,36 @@ export class MteSlam {
   }
 
   /** Sends a command; resolves when it was followed (true) or an `error` was emitted (false). */
-  send(command: Command): Promise<boolean> {
+  send(command: Command, keep?: Keep): Promise<boolean> {
     const id = this.#next++;
     return new Promise((resolve) => {
       this.#answers.set(id, resolve);
-      this.#worker.postMessage({ id, command } satisfies WorkerMessage);
+      this.#worker.postMessage({ id, command, keep } satisfies WorkerMessage);
     });
   }
 
-  /** Opens a recording. */
-  open(source: SourceSpec, settings: Settings = {}): Promise<boolean> {
-    return this.send({ type: "open", source, settings });
+  /**
+   * Opens a recording. With `keep`, the run's state is kept on this device now and then; with
+   * `keep.resume` the run goes on from there, on a new device.
+   */
+  open(source: SourceSpec, settings: Settings = {}, keep?: Keep): Promise<boolean> {
+    const held = keep?.resume && this.#held?.id === keep.id ? this.#held.bytes : undefined;
+    return this.send({ type: "open", source, settings, resume: held }, keep);
+  }
+
+  /** Runs whose state is kept on this device, the newest first. */
+  static kept(): Promise<KeptRun[]> {
+    return kept();
+  }
+
+  /** Forgets a kept run. */
+  static forget(id: string): Promise<void> {
+    return forget(id);
+  }
+
+  /** Keeps the run's state now. */
+  save(): Promise<boolean> {
+    return this.send({ type: "save" });
   }
 
   /** Processes frames until paused or done. */
@@ -104,6 +128,11 @@ export class MteSlam {
     await this.send({ type: "export", kind, resolutionM });
     off();
     return file;
+  }
+
+  /** Emits path, pose and the whole mesh again, for a view that has lost them. */
+  refresh(): Promise<boolean> {
+    return this.send({ type: "refresh" });
   }
 
   /** Ends the worker and makes a new one: the way out of a lost device or a crash. */

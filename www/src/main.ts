@@ -1,7 +1,9 @@
 // The page: wires controls, engine and view together. All computing happens in workers.
-import { MteSlam, type ErrorEvent, type ExportKind, type OpenedEvent, type Settings, type SourceSpec } from "./client";
+import { MteSlam, type ErrorEvent, type ExportKind, type KeptRun, type OpenedEvent, type Settings, type SourceSpec } from "./client";
 import { bytes, element, paint, seconds, show } from "./ui/dom";
 import { type Action, type FailureKind, fail } from "./ui/failure";
+import { type About, about, engineOf, mine, offer, sourceOf } from "./ui/kept";
+import { choiceFromForm, choose, chosen, formFromChoice } from "./ui/form";
 import { Legend } from "./ui/legend";
 import { Plots } from "./ui/plots";
 import { archive, dropped, inputFolder, pickFolder } from "./ui/sources";
@@ -36,7 +38,14 @@ const run = {
   /** When frames were done, for the time that is left. */
   begun: 0,
   begunAt: 0,
+  id: "",
+  /** Frames in the state that is kept of this run; 0 for none. */
+  kept: 0,
+  /** Frames that were done when it last went on from there; -1 for never. */
+  restoredAt: -1,
 };
+/** A run that goes on when its files are given again. */
+let awaited: KeptRun | undefined;
 /** Files that were given but not opened yet. */
 let given: SourceSpec | undefined;
 let hasGpu = false;
@@ -72,13 +81,19 @@ function progress(): void {
   bar.setAttribute("aria-valuenow", String(Math.round(part * 100)));
   const rate = (run.done - run.begun) / Math.max(1e-3, (performance.now() - run.begunAt) / 1000);
   const left = run.running && run.done - run.begun > 2 ? `about ${seconds((run.frames - run.done) / rate)} left` : "";
+  bar.setAttribute("aria-valuetext", `${run.done} of ${run.frames} frames`);
   element("eta").textContent = run.frames > 0 ? `${run.done} of ${run.frames} frames${left ? `, ${left}` : ""}` : "";
 }
 
-async function open(source: SourceSpec, choice: state.Choice): Promise<void> {
+/** Opens a recording and starts; `id` names a kept run to go on with. */
+async function open(source: SourceSpec, choice: state.Choice, id?: string, start = true): Promise<void> {
+  const again = id !== undefined && id === run.id;
   run.source = source;
   run.choice = choice;
   Object.assign(run, { opened: undefined, finished: false, frames: 0, done: 0, triangles: 0, lost: 0, begun: 0 });
+  if (!again) Object.assign(run, { id: id ?? `${Date.now()}-${Math.random()}`, kept: 0, restoredAt: -1 });
+  awaited = undefined;
+  mine(run.id);
   plots.clear();
   view.send({ type: "reset" });
   legend.set([]);
@@ -89,6 +104,7 @@ async function open(source: SourceSpec, choice: state.Choice): Promise<void> {
   show(element("failure"), false);
   show(element("tools"), true);
   show(element("new-run"), true);
+  show(element("share"), choice.source !== "");
   show(element("picked"), false);
   const query = state.write(choice);
   history.replaceState(null, "", query ? `?${query}` : location.pathname);
@@ -96,9 +112,10 @@ async function open(source: SourceSpec, choice: state.Choice): Promise<void> {
   progress();
   status("Opening the recording");
   const settings: Settings = { unroll: !software, ...choice.settings };
-  if (await slam.open(source, settings)) {
+  const keep = { id: run.id, about: about(source, choice), resume: id !== undefined };
+  if (await slam.open(source, settings, keep)) {
     run.begunAt = performance.now();
-    await slam.start();
+    if (start) await slam.start();
   }
 }
 
@@ -109,8 +126,34 @@ function again(change: Partial<Settings> = {}): void {
   else newRun();
 }
 
+/** Goes on from the state that is kept of the run on the page, with a new worker and device. */
+function restore(start: boolean): void {
+  run.restoredAt = run.done;
+  slam.restart();
+  if (run.source) void open(run.source, run.choice, run.id, start);
+}
+
+/** Goes on with a run of an earlier visit. */
+function goOn(kept: KeptRun): void {
+  const { choice, kind, name } = kept.about as About;
+  const source = sourceOf(kept);
+  const settings = { ...choice.settings, ...engineOf(choiceFromForm(run.choice).settings) };
+  if (source) return void open(source, { ...choice, settings }, kept.id);
+  awaited = kept;
+  note(`Give “${name}” again to go on: pick it or drop it here.`);
+  void ask(kind === "zip" ? "zip" : "folder");
+}
+
+/** Opens files that were given: anew, or for the run that waits for them. */
+function openFiles(source: SourceSpec): Promise<void> {
+  const waits = awaited;
+  if (waits && (waits.about as About).kind === source.kind) return open(source, (waits.about as About).choice, waits.id);
+  return open(source, { ...choiceFromForm(run.choice), source: "" });
+}
+
 function newRun(): void {
   void slam.pause();
+  void offer(goOn);
   show(element("failure"), false);
   show(form, true);
   show(element("tools"), false);
@@ -119,16 +162,24 @@ function newRun(): void {
 }
 
 function failed(kind: FailureKind, message: string, resumable: boolean): void {
+  const stopped = ["device-lost", "crashed", "engine", "out-of-memory"].includes(kind);
+  // Once by itself, and again only after it got further: a device that is always lost must not be
+  // asked for ever.
+  if (kind === "device-lost" && run.kept > 0 && run.done > run.restoredAt) {
+    const at = run.done;
+    restore(run.running);
+    return note(`The graphics device was lost at frame ${at}: ${message}. Going on from frame ${run.kept} on a new one.`, 20);
+  }
   const other: Action = { name: "New run", run: newRun };
   const actions: Action[] = [];
+  if (stopped && run.kept > 0) actions.push({ name: `Go on from frame ${run.kept}`, primary: true, run: () => restore(true) });
   if (resumable) actions.push({ name: "Resume", primary: true, run: () => void slam.start() });
   if (kind === "no-webgpu" || kind === "adapter" || kind === "limits")
     actions.push({ name: "Use the processor", primary: true, run: () => again({ engine: "cpu" }) });
-  if (kind === "device-lost" || kind === "crashed" || kind === "engine" || kind === "out-of-memory")
-    actions.push({ name: "Run again", primary: true, run: () => again() });
+  if (stopped) actions.push({ name: "Run again", primary: run.kept === 0, run: () => again() });
   if (kind === "viewer") actions.push({ name: "Go on without it", run: () => {} });
   else actions.push(other);
-  status("Stopped");
+  if (kind !== "viewer") status("Stopped");
   fail(kind, message, actions);
 }
 
@@ -158,6 +209,8 @@ slam.on("ready", ({ version, config }) => {
 slam.on("opened", (event) => {
   run.opened = event;
   run.frames = event.frames;
+  run.done = event.next;
+  if (event.next > 0) run.kept = event.next;
   element("run-name").textContent = `${event.name}, ${event.frames} frames of ${event.width} × ${event.height}, ${event.layout}`;
   const chip = element("engine");
   const cpu = event.engine.kind === "cpu";
@@ -236,6 +289,11 @@ slam.on("lost", (event) => {
   note(`Frame ${event.index} could not be located; the map ignores it.`);
 });
 slam.on("warning", (event) => note(event.message));
+slam.on("saved", (event) => {
+  if (event.id !== run.id) return;
+  if (event.why && run.kept === 0) note(`This browser keeps no state of the run (${event.why}): it goes on after a lost device, but not after a reload.`);
+  run.kept = event.frame;
+});
 slam.on("done", (event) => {
   run.finished = true;
   const lost = event.lost > 0 ? `, ${event.lost} lost` : "";
@@ -251,17 +309,29 @@ slam.on("crashed", (event) => {
 });
 
 let noteTimer = 0;
-function note(text: string): void {
+function note(text: string, seconds = 9): void {
   const place = element("notice");
   place.textContent = text;
   show(place, text !== "");
   clearTimeout(noteTimer);
-  noteTimer = window.setTimeout(() => show(place, false), 9000);
+  noteTimer = window.setTimeout(() => show(place, false), seconds * 1000);
 }
 
 // --- Controls --------------------------------------------------------------------------------
 
-toggle.onclick = () => void (run.running ? slam.pause() : slam.start());
+toggle.onclick = async () => {
+  if (!run.running) return void slam.start();
+  await slam.pause();
+  if (run.done > run.kept) void slam.save();
+};
+element("share").onclick = async () => {
+  try {
+    await navigator.clipboard.writeText(location.href);
+    note("Address copied: it holds the recording's address and the settings, no files.");
+  } catch {
+    note("Copy the address of this page: it holds the recording's address and the settings, no files.");
+  }
+};
 stepButton.onclick = () => void slam.step();
 input<HTMLInputElement>("seek").oninput = (e) => {
   element("seek-value").textContent = (e.target as HTMLInputElement).value;
@@ -304,6 +374,7 @@ function shade(button: HTMLButtonElement): void {
   view.shading(button.dataset.value as Shading);
 }
 shadings.forEach((button, i) => {
+  button.tabIndex = i === 0 ? 0 : -1;
   button.onclick = () => shade(button);
   button.onkeydown = (e) => {
     const by = e.key === "ArrowRight" ? 1 : e.key === "ArrowLeft" ? -1 : 0;
@@ -328,6 +399,18 @@ view.onPick = (hit) => {
   place.dataset.class = name;
 };
 view.onFailure = (message) => failed("viewer", message, false);
+view.onRestored = () => {
+  const pane = element("failure");
+  if (pane.dataset.kind === "viewer") show(pane, false);
+  theme.apply();
+  view.shading(element("shading").querySelector<HTMLElement>('[aria-checked="true"]')!.dataset.value as Shading);
+  view.send({ type: "classes", ...legend.state });
+  if (!run.opened) return;
+  view.send({ type: "truth", positions: run.opened.truth });
+  view.send({ type: "truthShown", on: truthButton.getAttribute("aria-pressed") === "true" });
+  note("The 3D view is back; the mesh is built again.");
+  void slam.refresh().then(() => status(run.finished ? "Done" : run.running ? "Mapping" : "Paused"));
+};
 
 for (const button of element("exports").querySelectorAll("button"))
   button.onclick = async () => {
@@ -350,55 +433,6 @@ for (const button of element("exports").querySelectorAll("button"))
 
 // --- Choosing a recording ----------------------------------------------------------------------
 
-const chosen = () => new FormData(form).get("source") as string;
-function choose(value: string): void {
-  const radio = form.querySelector<HTMLInputElement>(`input[value="${value}"]`);
-  if (radio) radio.checked = true;
-  show(element("url-row"), value === "url");
-}
-
-function choiceFromForm(): state.Choice {
-  const number = (id: string) => {
-    const n = input<HTMLInputElement>(id).valueAsNumber;
-    return Number.isFinite(n) ? n : undefined;
-  };
-  const settings: Settings = { ...run.choice.settings, preset: input<HTMLSelectElement>("preset").value };
-  const engine = input<HTMLSelectElement>("engine-choice").value;
-  settings.engine = engine as Settings["engine"];
-  settings.labels = input<HTMLSelectElement>("labels").value as Settings["labels"];
-  const tracker = input<HTMLSelectElement>("tracker").value;
-  if (tracker) settings.tracker = tracker;
-  else delete settings.tracker;
-  const frames = number("frames");
-  if (frames === undefined) delete settings.frames;
-  else settings.frames = frames;
-  settings.stride = number("stride") ?? 1;
-  settings.scale = number("scale") ?? 1;
-  settings.liveResolutionM = (number("resolution") ?? 5) / 100;
-  for (const box of element("switches").querySelectorAll<HTMLInputElement>("input")) {
-    if (box.checked === box.defaultChecked && settings.overrides?.[box.dataset.path!] === undefined) continue;
-    settings.overrides = { ...settings.overrides, [box.dataset.path!]: box.checked };
-  }
-  const source = chosen() === "url" ? input<HTMLInputElement>("url").value.trim() : chosen();
-  return { source, settings, width: run.choice.width, auto: false };
-}
-
-function formFromChoice({ source, settings: s }: state.Choice): void {
-  const set = (id: string, value: string | number | undefined | null) => {
-    if (value !== undefined && value !== null) input<HTMLInputElement>(id).value = String(value);
-  };
-  if (source) choose(["room", "office", "serve"].includes(source) ? source : "url");
-  if (source.includes("/")) set("url", source);
-  set("preset", s.preset ?? "fast");
-  set("engine-choice", s.engine);
-  set("labels", s.labels);
-  set("tracker", s.tracker);
-  set("frames", s.frames);
-  set("stride", s.stride);
-  set("scale", s.scale);
-  if (s.liveResolutionM) set("resolution", Math.round(s.liveResolutionM * 1e4) / 100);
-}
-
 /** Files were given: they are what the form now means. */
 function give(source: SourceSpec): void {
   given = source;
@@ -406,6 +440,7 @@ function give(source: SourceSpec): void {
   choose(kind);
   if (source.kind === "zip") element("zip-name").textContent = source.name;
   if (source.kind === "files") element("folder-name").textContent = `${source.name}, ${(source.files as unknown[]).length} files`;
+  if (awaited && (awaited.about as About).kind === source.kind) void openFiles(source);
 }
 
 async function ask(kind: string): Promise<void> {
@@ -440,7 +475,7 @@ element<HTMLInputElement>("folder-input").onchange = (e) => {
 };
 form.onsubmit = async (e) => {
   e.preventDefault();
-  const choice = choiceFromForm();
+  const choice = choiceFromForm(run.choice);
   try {
     const fits = given && given.kind === (chosen() === "zip" ? "zip" : "files") && ["zip", "folder"].includes(chosen());
     if (!fits && ["zip", "folder"].includes(chosen())) return void ask(chosen());
@@ -471,8 +506,9 @@ document.addEventListener("drop", async (e) => {
   if (!e.dataTransfer) return;
   try {
     const source = await dropped(e.dataTransfer);
+    const waits = awaited;
     give(source);
-    await open(source, { ...choiceFromForm(), source: "" });
+    if (!waits || awaited) await openFiles(source);
   } catch (error) {
     failed("bad-file", (error as Error).message, false);
   }
@@ -485,6 +521,8 @@ theme.start(element<HTMLButtonElement>("theme"), (t) => {
   plots.redraw();
 });
 document.addEventListener("visibilitychange", () => {
+  // Browsers may end a hidden tab.
+  if (document.hidden && run.running && run.done > run.kept) void slam.save();
   if (!document.hidden && run.running) note("Mapping went on while this tab was hidden, as far as the browser lets it.");
 });
 
@@ -511,7 +549,8 @@ async function lookForGpu(): Promise<void> {
 }
 
 // What tests look at.
-Object.assign(window, { mteSlam: { slam, view, plots, run } });
+const seen = { slam, view, plots, run, ready: false };
+Object.assign(window, { mteSlam: seen });
 
 const offered = document.querySelector('meta[name="mte-slam-serve"]');
 show(element("serve-card"), offered !== null);
@@ -519,6 +558,8 @@ formFromChoice(run.choice);
 if (offered && !run.choice.source) choose("serve");
 status("Ready");
 await lookForGpu();
+await offer(goOn);
+seen.ready = true;
 if (run.choice.auto) {
   const source = state.named(run.choice);
   if (source) await open(source, run.choice);

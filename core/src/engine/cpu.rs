@@ -122,9 +122,9 @@ impl CpuEngine {
 
     /// See [`Engine::info`](super::Engine::info).
     pub fn info(&self) -> EngineInfo {
-        #[cfg(feature = "std")]
+        #[cfg(feature = "threads")]
         let driver = alloc::format!("{} threads", rayon::current_num_threads());
-        #[cfg(not(feature = "std"))]
+        #[cfg(not(feature = "threads"))]
         let driver = "1 thread".to_string();
         EngineInfo {
             kind: "cpu",

@@ -84,15 +84,15 @@ impl<'a> CpuDispatch<'a> {
     }
 
     /// Calls `body` with every linear workgroup id x + count_x * (y + count_y * z), in parallel
-    /// and in any order with `std`.
+    /// and in any order with `threads`.
     pub fn for_each_workgroup(&self, body: impl Fn(u32) + Sync + Send) {
         let count = self.workgroups.iter().product::<u32>();
-        #[cfg(feature = "std")]
+        #[cfg(feature = "threads")]
         {
             use rayon::prelude::*;
             (0..count).into_par_iter().for_each(body);
         }
-        #[cfg(not(feature = "std"))]
+        #[cfg(not(feature = "threads"))]
         (0..count).for_each(body);
     }
 

@@ -1,23 +1,23 @@
-//! Loops over independent items: threads with `std`, serial without. Results never depend on
-//! how the work is split.
+//! Loops over independent items: threads with the feature of that name, serial without. Results
+//! never depend on how the work is split.
 use alloc::vec::Vec;
-#[cfg(feature = "std")]
+#[cfg(feature = "threads")]
 use rayon::prelude::*;
 
 /// `f(0), f(1), ... f(n - 1)`, in that order.
-#[cfg(feature = "std")]
+#[cfg(feature = "threads")]
 pub(crate) fn map<T: Send>(n: usize, f: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
     (0..n).into_par_iter().map(f).collect()
 }
 
 /// `f(0), f(1), ... f(n - 1)`, in that order.
-#[cfg(not(feature = "std"))]
+#[cfg(not(feature = "threads"))]
 pub(crate) fn map<T: Send>(n: usize, f: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
     (0..n).map(f).collect()
 }
 
 /// Calls `f(i, chunk)` for every chunk of `size` elements.
-#[cfg(feature = "std")]
+#[cfg(feature = "threads")]
 pub(crate) fn for_chunks<T: Send>(
     data: &mut [T],
     size: usize,
@@ -27,7 +27,7 @@ pub(crate) fn for_chunks<T: Send>(
 }
 
 /// Calls `f(i, chunk)` for every chunk of `size` elements.
-#[cfg(not(feature = "std"))]
+#[cfg(not(feature = "threads"))]
 pub(crate) fn for_chunks<T: Send>(
     data: &mut [T],
     size: usize,

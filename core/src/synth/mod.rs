@@ -167,14 +167,14 @@ impl Sequence for SyntheticSequence {
     }
 }
 
-/// Call `work` with every chunk of `size` elements and its number, in parallel with `std`.
+/// Call `work` with every chunk of `size` elements and its number, in parallel with `threads`.
 fn par_chunks<T: Send>(out: &mut [T], size: usize, work: impl Fn(usize, &mut [T]) + Sync + Send) {
-    #[cfg(feature = "std")]
+    #[cfg(feature = "threads")]
     {
         use rayon::prelude::*;
         out.par_chunks_mut(size).enumerate().for_each(|(i, chunk)| work(i, chunk));
     }
-    #[cfg(not(feature = "std"))]
+    #[cfg(not(feature = "threads"))]
     out.chunks_mut(size).enumerate().for_each(|(i, chunk)| work(i, chunk));
 }
 

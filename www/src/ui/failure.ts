@@ -34,7 +34,7 @@ const TEXTS: Record<FailureKind, Text> = {
     title: "The graphics device was lost",
     help: [
       "The driver was reset, the computer slept, or another program took the device. The mesh on screen stays until a new run begins.",
-      "Run again makes a new device and repeats the run from its first frame; the same seed gives the same map.",
+      "Go on makes a new device and continues from the last state that was kept; Run again repeats the run from its first frame.",
     ],
   },
   "out-of-memory": {
@@ -60,7 +60,7 @@ const TEXTS: Record<FailureKind, Text> = {
   engine: { title: "The engine failed", help: ["This is a mistake in this program. The message helps to find it."] },
   crashed: {
     title: "The engine stopped",
-    help: ["Its memory may have run out, or this is a mistake in this program. Use a smaller image scale or the preset Tiny, or run again."],
+    help: ["Its memory may have run out, or this is a mistake in this program. Go on continues from the last state that was kept, if there is one.", "If it stops again, use a smaller image scale or the preset Tiny."],
   },
   viewer: {
     title: "The 3D view cannot be shown",

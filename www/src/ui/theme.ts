@@ -11,6 +11,9 @@ function variable(name: string): Vec3 {
   return hex ? [1, 2, 3].map((i) => parseInt(hex[i]!, 16) / 255) as Vec3 : [0.5, 0.5, 0.5];
 }
 
+/** Tells the theme once more. */
+export let apply: () => void = () => {};
+
 export function start(button: HTMLButtonElement, changed: (theme: Theme) => void): void {
   const system = matchMedia("(prefers-color-scheme: light)");
   let chosen: string | null = null;
@@ -19,7 +22,7 @@ export function start(button: HTMLButtonElement, changed: (theme: Theme) => void
   } catch {
     // Storage can be forbidden; the choice then lasts as long as the page.
   }
-  const apply = () => {
+  apply = () => {
     const light = chosen ? chosen === "light" : system.matches;
     document.documentElement.dataset.theme = light ? "light" : "dark";
     changed({
@@ -27,7 +30,7 @@ export function start(button: HTMLButtonElement, changed: (theme: Theme) => void
       truth: variable("--truth"), dark: !light,
     });
   };
-  system.addEventListener("change", apply);
+  system.addEventListener("change", () => apply());
   button.onclick = () => {
     chosen = document.documentElement.dataset.theme === "light" ? "dark" : "light";
     try {

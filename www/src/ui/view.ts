@@ -12,6 +12,8 @@ export class View {
   onPick: (hit: Hit) => void = () => {};
   onFollow: (on: boolean) => void = () => {};
   onFailure: (message: string) => void = () => {};
+  /** The view was lost and is back, empty. */
+  onRestored: () => void = () => {};
   readonly #canvas: HTMLCanvasElement;
   readonly #worker: Worker;
   readonly #pending = new Map<number, (event: ViewEvent) => void>();
@@ -70,7 +72,11 @@ export class View {
 
   #receive(event: ViewEvent): void {
     if (event.type === "unsupported") this.onFailure(event.message);
-    if (event.type === "lost") this.onFailure("the browser took the 3D view's context away; reload the page to have it back");
+    if (event.type === "lost") this.onFailure("the browser took the 3D view's context away; it comes back when the browser allows");
+    if (event.type === "restored") {
+      this.#resize();
+      this.onRestored();
+    }
     if (event.type === "followed") this.onFollow(event.on);
     if ("id" in event) {
       this.#pending.get(event.id)?.(event);

@@ -36,6 +36,8 @@ export type ViewEvent =
   | { type: "ready" }
   | { type: "unsupported"; message: string }
   | { type: "lost" }
+  /** The context came back, empty. */
+  | { type: "restored" }
   | { type: "followed"; on: boolean }
   | { type: "picked"; id: number; hit: { class: number; point: Vec3 } | null }
   | {

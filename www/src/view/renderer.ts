@@ -165,6 +165,8 @@ export class Renderer {
   #distance = 5;
   #turn = 0.7;
   #lift = 0.75;
+  /** The turn that shows what the sensor saw first, from its side. */
+  #home: number | undefined;
   #up: Vec3 = [0, 0, 1];
   #upSum: Vec3 = [0, 0, 0];
   #touched = false;
@@ -215,6 +217,9 @@ export class Renderer {
     this.#upSum = [0, 0, 0];
     this.#up = [0, 0, 1];
     this.#touched = false;
+    this.#home = undefined;
+    this.#turn = 0.7;
+    this.#lift = 0.75;
     this.follow = false;
     this.changed = true;
   }
@@ -295,6 +300,14 @@ export class Renderer {
     const snapped: Vec3 = [0, 0, 0];
     if (axis !== undefined) snapped[axis] = Math.sign(up[axis]!);
     this.#up = axis === undefined ? up : snapped;
+    if (this.#home === undefined) {
+      // Surfaces are drawn on the side that was seen, so the first look is from there, a little
+      // to the side.
+      const forward = across(this.#up);
+      const away: Vec3 = [-m[2]!, -m[6]!, -m[10]!];
+      this.#home = Math.atan2(dot(away, cross(this.#up, forward)), dot(away, forward)) + 0.4;
+      if (!this.#touched) this.#turn = this.#home;
+    }
     this.changed = true;
   }
 
@@ -333,7 +346,7 @@ export class Renderer {
   /** Shows everything and keeps doing so while the map grows. */
   fit(): void {
     this.#touched = this.follow = false;
-    this.#turn = 0.7;
+    this.#turn = this.#home ?? 0.7;
     this.#lift = 0.75;
     this.#frame();
     this.changed = true;
@@ -390,6 +403,14 @@ export class Renderer {
     }
     const mean = scale(sum, 1 / n);
     return { triangles, chunks: this.#chunks.size, covered: covered / n, mean, eye: this.#eye().eye, bytes };
+  }
+
+  /** Takes the context away as a browser short of memory does, and gives it back. */
+  async loseContext(): Promise<void> {
+    const extension = this.#gl.getExtension("WEBGL_lose_context");
+    extension?.loseContext();
+    await new Promise((resolve) => setTimeout(resolve, 200));
+    extension?.restoreContext();
   }
 
   draw(): void {

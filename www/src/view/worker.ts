@@ -5,6 +5,8 @@ import type { ViewEvent, ViewMessage } from "./protocol";
 const scope = self as unknown as DedicatedWorkerGlobalScope;
 const post = (event: ViewEvent) => scope.postMessage(event);
 let renderer: Renderer | undefined;
+// What tests look at.
+Object.defineProperty(scope, "view", { get: () => renderer });
 let waiting = false;
 
 function schedule(): void {
@@ -19,8 +21,17 @@ function schedule(): void {
 scope.onmessage = ({ data }: MessageEvent<ViewMessage>) => {
   if (data.type === "canvas") {
     try {
-      renderer = new Renderer(data.canvas);
-      data.canvas.addEventListener("webglcontextlost", () => post({ type: "lost" }));
+      const { canvas } = data;
+      renderer = new Renderer(canvas);
+      canvas.addEventListener("webglcontextlost", (event) => {
+        // Asks for it back.
+        event.preventDefault();
+        post({ type: "lost" });
+      });
+      canvas.addEventListener("webglcontextrestored", () => {
+        renderer = new Renderer(canvas);
+        post({ type: "restored" });
+      });
       post({ type: "ready" });
     } catch (error) {
       post({ type: "unsupported", message: error instanceof Error ? error.message : String(error) });

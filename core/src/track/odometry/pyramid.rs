@@ -6,7 +6,7 @@ use alloc::{vec, vec::Vec};
 use glam::DVec3;
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
-#[cfg(feature = "std")]
+#[cfg(feature = "threads")]
 use rayon::prelude::*;
 
 /// A point of the frame that is being located.
@@ -328,9 +328,9 @@ impl Level {
                 }
             }
         };
-        #[cfg(feature = "std")]
+        #[cfg(feature = "threads")]
         planes.par_chunks_mut(w).enumerate().for_each(|(v, out)| row(v, out));
-        #[cfg(not(feature = "std"))]
+        #[cfg(not(feature = "threads"))]
         planes.chunks_mut(w).enumerate().for_each(|(v, out)| row(v, out));
         level.planes = planes;
         for v in 0..h {

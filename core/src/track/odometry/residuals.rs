@@ -4,7 +4,7 @@
 //! result has the same bits for any number of threads.
 use super::pyramid::{Level, Point};
 use alloc::{vec, vec::Vec};
-#[cfg(feature = "std")]
+#[cfg(feature = "threads")]
 use rayon::prelude::*;
 
 /// Points a task takes; short enough that f32 sums stay exact to 1e-5.
@@ -168,10 +168,10 @@ fn rotate(r: &[[f32; 3]; 3], p: [f32; 3]) -> [f32; 3] {
 pub(super) fn evaluate(reference: &Level, points: &[Point], model: &Model) -> Sums {
     let size = CHUNK * model.stride;
     let mut total = Sums::zero();
-    #[cfg(feature = "std")]
+    #[cfg(feature = "threads")]
     let parts =
         points.par_chunks(size).map(|c| evaluate_chunk(reference, c, model)).collect::<Vec<_>>();
-    #[cfg(not(feature = "std"))]
+    #[cfg(not(feature = "threads"))]
     let parts = points.chunks(size).map(|c| evaluate_chunk(reference, c, model));
     for part in parts {
         total.add(&part);

@@ -215,7 +215,7 @@ fn a_walk_stays_on_course_and_follows_corrections() {
     assert!(!odometer.set_keyframe_pose(999, shift));
 }
 
-#[cfg(feature = "std")]
+#[cfg(feature = "threads")]
 #[test]
 fn the_number_of_threads_does_not_change_a_bit() {
     let run = |threads| {
