@@ -1,4 +1,4 @@
-//! A tiny recording in every layout, for tests and for the fuzzer.
+//! A tiny recording in every layout, for tests.
 use mte_slam_core::{
     dataset::{
         ColorFormat, Layout, MemorySource, RecordingWriter, ReplicaWriter, SensWriter, TumWriter,
