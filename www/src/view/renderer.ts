@@ -202,6 +202,7 @@ export class Renderer {
       canvas.width = this.#width;
       canvas.height = this.#height;
     }
+    if (!this.#touched && !this.follow) this.#frame();
     this.changed = true;
   }
 
