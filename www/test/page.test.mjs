@@ -169,7 +169,7 @@ test("the page stays responsive while mapping", { timeout: 120_000 }, async () =
   await finish(page);
 });
 
-test("memory over 200 frames: flat, but for what the odometry keeps of its keyframes", { timeout: 240_000 }, async () => {
+test("memory over 200 frames: flat, but for what the odometry keeps of its keyframes and a buffer for kept states", { timeout: 240_000 }, async () => {
   const page = await visit("source=room&preset=tiny&engine=cpu&width=48&frames=200&mesh=20&render=0&set.mapping.rays=64&set.mapping.iterations=2&set.mapping.first_iterations=10&set.mapping.final_iterations=2&set.tracking.align_pixels=128&set.keyframes.budget_mib=1");
   await page.evaluate(() => {
     window.memory = [];
@@ -191,7 +191,10 @@ test("memory over 200 frames: flat, but for what the odometry keeps of its keyfr
   console.log(`# frames 60 to 199: wasm ${mb(early[1])} to ${mb(late[1])} MB, device ${mb(early[2])} to ${mb(late[2])} MB, heap ${mb(heapBefore)} to ${mb(heapAfter)} MB`);
   // At this size every frame is a keyframe of the odometry, with about 100 bytes a pixel.
   const keyframes = 140 * 48 * 36 * 110;
-  assert.ok(late[1] - early[1] <= keyframes, `the module's memory grows by ${late[1] - early[1]} bytes, the keyframes' share is ${keyframes}`);
+  // A kept state passes through the module's memory tensor by tensor; the largest has 27 MB, and may
+  // find a gap only from the second state on.
+  const state = 32e6;
+  assert.ok(late[1] - early[1] <= keyframes + state, `the module's memory grows by ${late[1] - early[1]} bytes, expected at most ${keyframes} for keyframes and ${state} for a state`);
   assert.ok(late[2] <= early[2], "the device's memory grows");
   assert.ok(heapAfter <= heapBefore * 1.5 + 3e6, "the heap grows");
   await finish(page);
