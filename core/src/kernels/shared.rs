@@ -109,7 +109,7 @@ impl Ray {
 /// Sine and cosine of an angle \[rad\] of up to some hundreds, to 1e-6 of 1, by the polynomials of
 /// `shaders/shared/angle.wgsl`: WGSL's own functions may be off by 2^-11.
 pub fn sin_cos(angle: f32) -> [f32; 2] {
-    let quarters = libm::floorf(angle * 0.636_619_77 + 0.5);
+    let quarters = libm::floorf(angle * core::f32::consts::FRAC_2_PI + 0.5);
     let r = ((angle - quarters * 1.570_312_5) - quarters * 4.837_513e-4) - quarters * 7.549_79e-8;
     let z = r * r;
     let s = r + r * z * (-0.166_666_55 + z * (8.332_161e-3 - z * 1.951_529_6e-4));
