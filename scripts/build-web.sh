@@ -30,11 +30,11 @@ target=$(
     # Every browser that has WebGPU has 128-bit SIMD; it does not change a bit of the results.
     export CARGO_PROFILE_RELEASE_DEBUG=0 CARGO_PROFILE_RELEASE_LTO=fat \
         CARGO_PROFILE_RELEASE_CODEGEN_UNITS=1 CARGO_PROFILE_RELEASE_PANIC=abort \
-        CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS="-C target-feature=+simd128" \
+        CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS="-C target-feature=+simd128 -C llvm-args=-inline-threshold=25" \
         CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}/web"
     # What runs once a frame at most is made small; the kernels' twins are not.
     set -- --config profile.release.package.mte-slam-core.opt-level=2
-    for crate in mte-slam-web serde_json zip zune-jpeg image wgpu js-sys serde-wasm-bindgen; do
+    for crate in mte-slam-web serde_json zip zune-jpeg image png fdeflate miniz_oxide wgpu js-sys serde-wasm-bindgen; do
         set -- "$@" --config "profile.release.package.$crate.opt-level='s'"
     done
     cargo build --locked --release "$@" -p mte-slam-web --target wasm32-unknown-unknown >&2
