@@ -193,11 +193,15 @@ impl Slam {
 
     /// Fused features of every keyframe by what the fusion has learned since.
     fn refresh_targets(&mut self) -> Result<(), SlamError> {
-        let slots: Vec<u32> = self.keyframes.iter().map(|k| k.slot).collect();
+        let keyframes: Vec<_> =
+            self.keyframes.iter().map(|k| (k.slot, k.world_from_camera)).collect();
         let device = self.device()?;
-        for slots in slots.chunks(ITERATIONS_PER_RECORDING as usize) {
+        for some in keyframes.chunks(ITERATIONS_PER_RECORDING as usize) {
             let mut r = Recording::default();
-            slots.iter().for_each(|slot| device.record_fusion_forward(&mut r, *slot));
+            for (slot, pose) in some {
+                device.upload_pose(&mut r, *slot, pose);
+                device.record_fusion_forward(&mut r, *slot);
+            }
             device.engine.submit(&r)?;
         }
         Ok(())
