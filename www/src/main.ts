@@ -101,7 +101,9 @@ async function open(source: SourceSpec, choice: state.Choice, id?: string, start
     paint(element<HTMLCanvasElement>(id), new Uint8Array(), 160, 120);
   element("frame-number").textContent = "";
   show(form, false);
-  show(element("failure"), false);
+  // That the view fails may be known before a run opens by itself, and stays true.
+  const pane = element("failure");
+  if (pane.dataset.kind !== "viewer") show(pane, false);
   show(element("tools"), true);
   show(element("new-run"), true);
   show(element("share"), choice.source !== "");
