@@ -175,9 +175,7 @@ impl Slam {
         let rates = Rates { planes: m.rate_planes * factor, decoders: m.rate_decoders * factor };
         let f = &self.config.fusion;
         let fusion_steps = if semantic {
-            let until =
-                |left: u32| u64::from(f.final_steps) * u64::from(total - left) / u64::from(total);
-            (until(left - iterations) - until(left)) as u32
+            steps_due(f.final_steps, total, total - left, iterations)
         } else {
             f.steps * iterations / m.iterations.max(1)
         };
@@ -327,7 +325,7 @@ impl Slam {
                 .iter()
                 .map(|&k| (keyframes[k].0, !refine || k == 0 || Some(k) == oldest))
                 .collect();
-            for step in 0..steps_due(fusion_steps, iterations, i) {
+            for step in 0..steps_due(fusion_steps, iterations, i, 1) {
                 // Every other step goes over an earlier frame: the fusion must not forget.
                 let k = if (i + step).is_multiple_of(2) && recent > 0 {
                     n - 1

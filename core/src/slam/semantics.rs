@@ -38,10 +38,11 @@ impl ClassCounts {
     }
 }
 
-/// Training steps of the fusion that are due at an iteration, of `steps` spread over `iterations`.
-pub(super) fn steps_due(steps: u32, iterations: u32, iteration: u32) -> u32 {
+/// Training steps of the fusion that are due in `count` iterations from the `first` on, of `steps`
+/// spread over `iterations`.
+pub(super) fn steps_due(steps: u32, iterations: u32, first: u32, count: u32) -> u32 {
     let until = |i: u32| u64::from(i) * u64::from(steps) / u64::from(iterations.max(1));
-    (until(iteration + 1) - until(iteration)) as u32
+    (until(first + count) - until(first)) as u32
 }
 
 impl Slam {
