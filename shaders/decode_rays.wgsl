@@ -93,7 +93,6 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
         }
         // Nearest anchor (paper eq. 9).
         var nearest = ${NO_ANCHOR}u;
-        var nearest_class = 255u;
         var distance = 1e30;
         var own_distance = 1e30;
         var own_nearest = ${NO_ANCHOR}u;
@@ -110,7 +109,6 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
 #end
             if (d < distance) {
                 nearest = a;
-                nearest_class = class_id;
                 distance = d;
             }
             if (class_id == label && d < own_distance) {
@@ -163,7 +161,8 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
 #end
         }
         if ((params.flags & FLAG_ANCHORS) != 0u && nearest != ${NO_ANCHOR}u) {
-            best_class = nearest_class;
+            let at = nearest * ${ANCHOR_VEC4}u;
+            best_class = likeliest_class(array<vec4f, 4>(anchors[at], anchors[at + 1u], anchors[at + 2u], anchors[at + 3u]));
         }
         var loss_feature = 0.0;
         if (!masked && params.weight_compression > 0.0 && nearest != ${NO_ANCHOR}u) {

@@ -174,6 +174,21 @@ fn main(@builtin(local_invocation_index) lane: u32) {
                 }
             }
             other = NONE;
+            // Full: a class without any anchor takes the place of the least important one that is not its class's last.
+            if (slot == params.anchors && best_index[0] != NONE && of_class[ray_class(rays[best_index[0]])] == 0u) {
+                var least = 1e30;
+                for (var i = 0u; i < params.anchors; i++) {
+                    let importance = anchors[i * ${ANCHOR_VEC4}u + 4u].z;
+                    if (of_class[class_of(i)] > 1u && importance < least) {
+                        least = importance;
+                        slot = i;
+                    }
+                }
+                if (slot < params.anchors) {
+                    of_class[class_of(slot)] -= 1u;
+                    anchor_counts[2] += 1u;
+                }
+            }
             if (slot < params.anchors && best_index[0] != NONE) {
                 other = slot;
                 let ray = best_index[0];

@@ -35,31 +35,26 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     let rgb = color_output(color_hidden(lookup_appearance(p)));
     var best_class = 255u;
     if (params.classes > 0u) {
-        let feature = semantic_output(semantic_hidden(lookup_semantic(p)));
-        var best = -1e30;
-        for (var c = 0u; c < params.classes; c++) {
-            let logit = class_logit(feature, c);
-            if (logit > best) {
-                best = logit;
-                best_class = c;
-            }
-        }
+        var feature = semantic_output(semantic_hidden(lookup_semantic(p)));
         if ((params.flags & FLAG_ANCHORS) != 0u) {
+            // The nearest anchor stands for the feature.
             var nearest = 1e30;
+            var anchor = feature;
             for (var a = 0u; a < params.anchors; a++) {
                 let at = a * ${ANCHOR_VEC4}u;
-                let class_id = bitcast<u32>(anchors[at + 4u].x);
                 var d = 0.0;
 #for j in 0..4
                 let e${j} = feature[${j}] - anchors[at + ${j}u];
                 d += dot(e${j}, e${j});
 #end
-                if (class_id != 255u && d < nearest) {
+                if (bitcast<u32>(anchors[at + 4u].x) != 255u && d < nearest) {
                     nearest = d;
-                    best_class = class_id;
+                    anchor = array<vec4f, 4>(anchors[at], anchors[at + 1u], anchors[at + 2u], anchors[at + 3u]);
                 }
             }
+            feature = anchor;
         }
+        best_class = likeliest_class(feature);
     }
     values[i * 8u] = distance;
     values[i * 8u + 1u] = bitcast<f32>(best_class);

@@ -12,7 +12,21 @@
 @group(0) @binding(3) var<storage, read> color_images: array<u32>;
 // Per slot ceil(width * height / 2) words: two depths each.
 @group(0) @binding(4) var<storage, read> depth_images: array<u32>;
-@group(0) @binding(5) var<storage, read_write> rays: array<Ray>;
+// How rare each class is; only the order matters.
+@group(0) @binding(5) var<storage, read> class_rarity: array<f32>;
+@group(0) @binding(6) var<storage, read_write> rays: array<Ray>;
+
+// Rarity of a pixel's class: 0 without a class, -1 without depth.
+fn rarity(slot: u32, pixel: u32) -> f32 {
+    if (raw_depth(slot, pixel) == 0u) {
+        return -1.0;
+    }
+    let label = color_images[slot * params.width * params.height + pixel] >> 24u;
+    if (label >= params.classes) {
+        return 0.0;
+    }
+    return class_rarity[label];
+}
 
 fn raw_depth(slot: u32, pixel: u32) -> u32 {
     let stride = (params.width * params.height + 1u) / 2u;
@@ -36,6 +50,18 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
         raw = raw_depth(slot, pixel);
         if (raw == 0u) {
             pixel = random_u32(params.seed, params.iteration, ray, 1u) % pixels;
+            raw = raw_depth(slot, pixel);
+        }
+        if (params.classes > 0u && random_f32(params.seed, params.iteration, ray, 3u) < params.rare_share) {
+            var best = rarity(slot, pixel);
+            for (var k = 1u; k < params.rare_draws; k++) {
+                let candidate = random_u32(params.seed, params.iteration, ray * 256u + k, 4u) % pixels;
+                let rare = rarity(slot, candidate);
+                if (rare > best) {
+                    best = rare;
+                    pixel = candidate;
+                }
+            }
             raw = raw_depth(slot, pixel);
         }
     } else if ((params.flags & FLAG_GUIDED) != 0u) {

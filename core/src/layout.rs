@@ -216,5 +216,9 @@ params! {
         doubt_fused: f32,
         /// Samples of a ray that the per-sample head sees: all, or in views the first few that carry weight.
         slots: u32,
+        /// Share of the drawn rays whose pixel is the rarest in class of `rare_draws` candidates.
+        rare_share: f32,
+        /// Candidates of such a ray.
+        rare_draws: u32,
     }
 }

@@ -32,6 +32,8 @@ struct Params {
     doubt_anchor: f32, doubt_fused: f32,
     // Samples of a ray that the per-sample head sees.
     slots: u32,
+    // Share of drawn rays that are the rarest in class of so many candidates.
+    rare_share: f32, rare_draws: u32,
 }
 @group(0) @binding(0) var<uniform> params: Params;
 

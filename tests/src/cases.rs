@@ -156,8 +156,11 @@ pub fn cases(kernel: &str) -> Vec<Case> {
             let mut window = before(&SAMPLE_RAYS, &both);
             // Past the last pixel it starts again.
             window.params.first = window.params.width * window.params.height - 20;
+            let mut rare = before(&SAMPLE_RAYS, &usual);
+            (rare.params.rare_share, rare.params.rare_draws) = (0.6, 5);
             vec![
                 chained("random", &SAMPLE_RAYS, &usual, &["rays"]),
+                case("rare classes", &SAMPLE_RAYS, &rare, &["rays"]),
                 chained("dense", &SAMPLE_RAYS, &dense, &["rays"]),
                 case("dense and guided", &SAMPLE_RAYS, &window, &["rays"]),
             ]

@@ -277,6 +277,7 @@ impl State {
         zero("gradient_semantic", shape.surface_floats());
         zero("status", 4);
         b.insert("class_weights", f32_words([1.0, 0.5, 2.0, 1.5, 0.75]));
+        b.insert("class_rarity", f32_words([0.1, 0.5, 2.0, 0.3, 0.3]));
         let mut zero = |name, words| b.insert(name, vec![0; words]);
         // Neither anchors nor fused features.
         zero("anchors", 4);

@@ -679,6 +679,25 @@ pub fn maintenance() -> Vec<(Case, [u32; 4])> {
             },
             [CLASSES, 0, 0, 0],
         ),
+        // Classes without any anchor take the places of the least important, never of a class's last.
+        (
+            Maintenance {
+                spawns: 8,
+                spawn_distance: 1.0,
+                slots: CLASSES,
+                ..plain(
+                    "evict",
+                    vec![
+                        (1.0, class(0)),
+                        (2.0, Anchor { importance: 3.0, ..class(0) }),
+                        (3.0, class(1)),
+                        (4.0, Anchor { importance: 2.0, ..class(2) }),
+                        (5.0, Anchor { importance: 4.0, ..class(1) }),
+                    ],
+                )
+            },
+            [CLASSES, 2, 2, 0],
+        ),
         // One drops, two merge, and their slots are used again.
         (
             Maintenance {

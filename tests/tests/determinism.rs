@@ -64,6 +64,7 @@ fn map_with(engine: Engine, head: Head, iterations: u32) -> Vec<Vec<u32>> {
             loss: &loss,
             iteration,
             first: 0,
+            rare_share: 0.0,
             guidance: Guidance::default(),
         };
         let mut r = Recording::new();
@@ -197,6 +198,7 @@ fn fuse(engine: Engine) -> Vec<Vec<u32>> {
             loss: &loss,
             iteration,
             first: 0,
+            rare_share: 0.0,
             guidance: Guidance { compression: 0.05, feature: 0.1, ..Guidance::default() },
         };
         let mut r = Recording::new();

@@ -303,6 +303,7 @@ fn batch(compression: f64, feature: f64) -> Batch<'static> {
         loss: &NO_LOSS,
         iteration: 5,
         first: 0,
+        rare_share: 0.0,
         guidance: Guidance { compression, feature, ..Guidance::default() },
     }
 }

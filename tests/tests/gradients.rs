@@ -112,6 +112,7 @@ impl Problem {
             loss,
             iteration: 5,
             first: 0,
+            rare_share: 0.0,
             guidance: Guidance::default(),
         }
     }

@@ -229,6 +229,7 @@ fn a_reused_slot_forgets_the_pose_steps_of_its_former_frame() {
                 loss: &loss,
                 iteration,
                 first: 0,
+                rare_share: 0.0,
                 guidance: Guidance::default(),
             };
             d.record_forward(r, &batch);

@@ -94,6 +94,8 @@ pub struct Batch<'a> {
     pub iteration: u32,
     /// First pixel of a dense batch.
     pub first: u32,
+    /// Share of the rays that seek rare classes.
+    pub rare_share: f64,
     /// What fusion and suppressor say about the rays' semantics.
     pub guidance: Guidance,
 }
@@ -199,6 +201,8 @@ pub struct Device {
     no_anchors: BufferId,
     /// Weights of the classes in the cross-entropy of rays.
     class_weights: BufferId,
+    /// How rare the classes are, for the drawing of rays.
+    class_rarity: BufferId,
     /// The same in the fusion's.
     token_class_weights: BufferId,
     /// Fused features of all slots' tokens.
@@ -268,6 +272,7 @@ impl Device {
         base.seed = config.seed;
         base.classes = classes;
         base.min_weight = s.min_weight as f32;
+        base.rare_draws = s.rare_draws;
         base.decoder_stride = config.mapping.decoder_stride;
         base.contribution_limit = 4_194_304.0;
         base.min_gradient = config.mapping.min_gradient as f32;
@@ -342,6 +347,7 @@ impl Device {
             )?,
             no_anchors: e.create_buffer("no anchors", 4)?,
             class_weights: e.create_buffer("class weights", classes.max(4) as usize)?,
+            class_rarity: e.create_buffer("class rarity", classes.max(4) as usize)?,
             token_class_weights: e.create_buffer("token class weights", classes.max(4) as usize)?,
             targets: e.create_buffer("targets", (slots as usize * targets).max(4))?,
             points: e.create_buffer("points", QUERY_POINTS_MAX * 4)?,
@@ -357,7 +363,7 @@ impl Device {
         r.upload(device.semantic.values, 0, &initial_planes(device.semantic.floats, seed, 2));
         r.upload(device.decoders.values, 0, &initial_decoders(classes, seed));
         let equal = vec![1.0_f32; classes as usize];
-        device.upload_class_weights(&mut r, &equal, &equal);
+        device.upload_class_weights(&mut r, &equal, &equal, &equal);
         device.engine.submit(&r)?;
         Ok(device)
     }
@@ -395,8 +401,16 @@ impl Device {
         }
     }
 
-    /// Weights of the classes in the cross-entropy of rays and of the fusion, one a class.
-    pub fn upload_class_weights(&self, r: &mut Recording, rays: &[f32], fusion: &[f32]) {
+    /// Weights of the classes in the cross-entropy of rays and of the fusion, and how rare they are;
+    /// one a class.
+    pub fn upload_class_weights(
+        &self,
+        r: &mut Recording,
+        rays: &[f32],
+        fusion: &[f32],
+        rarity: &[f32],
+    ) {
+        r.upload(self.class_rarity, 0, rarity);
         r.upload(self.class_weights, 0, rays);
         r.upload(self.token_class_weights, 0, fusion);
     }

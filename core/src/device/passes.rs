@@ -40,6 +40,7 @@ impl Device {
         p.flags = b.flags;
         p.iteration = b.iteration;
         p.first = b.first;
+        p.rare_share = b.rare_share as f32;
         p.weight_free = b.loss.free_space as f32;
         p.weight_centre = b.loss.centre as f32;
         p.weight_tail = b.loss.tail as f32;
@@ -68,8 +69,15 @@ impl Device {
         let (geometry, decoders) = (self.geometry.values, self.decoders.values);
         r.dispatch_1d(
             &SAMPLE_RAYS,
-            &p,
-            &[self.poses, self.window, self.color_images, self.depth_images, self.rays],
+            &full,
+            &[
+                self.poses,
+                self.window,
+                self.color_images,
+                self.depth_images,
+                self.class_rarity,
+                self.rays,
+            ],
             rays,
         );
         r.dispatch_1d(&SAMPLE_DEPTHS, &p, &[self.rays, geometry, decoders, self.depths], rays);

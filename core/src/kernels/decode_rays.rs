@@ -2,7 +2,7 @@
 //! compression; their gradients.
 use super::shared::{
     FLAG_ANCHORS, Ray, class_logit, color_backward, color_hidden, color_output, head_row,
-    semantic_backward, semantic_hidden, semantic_output, surface_weights,
+    likeliest_class, semantic_backward, semantic_hidden, semantic_output, surface_weights,
 };
 use super::{CpuDispatch, load_f32, store_f32, store_u32};
 use crate::layout::{
@@ -45,7 +45,6 @@ fn get<const N: usize>(state: &[AtomicU32], at: u32) -> [f32; N] {
 
 pub(super) struct Match {
     pub(super) index: u32,
-    pub(super) class: u32,
     distance: f32,
     /// The nearest anchor of the ray's own class.
     own_index: u32,
@@ -76,7 +75,6 @@ pub(super) fn nearest_anchor(
 ) -> Match {
     let mut best = Match {
         index: NO_ANCHOR,
-        class: 255,
         distance: NO_DISTANCE,
         own_index: NO_ANCHOR,
         own_distance: NO_DISTANCE,
@@ -88,13 +86,19 @@ pub(super) fn nearest_anchor(
         }
         let distance = (0..16).map(|k| (feature[k] - a[k]) * (feature[k] - a[k])).sum::<f32>();
         if distance < best.distance {
-            (best.index, best.class, best.distance) = (j as u32, class, distance);
+            (best.index, best.distance) = (j as u32, distance);
         }
         if class == label && distance < best.own_distance {
             (best.own_index, best.own_distance) = (j as u32, distance);
         }
     }
     best
+}
+
+/// The class of an anchor: what the head says of its vector.
+pub(super) fn anchor_class(p: &FieldParams, decoders: &[f32], anchors: &[f32], index: u32) -> u32 {
+    let at = index as usize * ANCHOR_FLOATS;
+    likeliest_class(decoders, &core::array::from_fn(|k| anchors[at + k]), p.classes)
 }
 
 /// The fused feature of the token that a ray's pixel lies in, and its weight.
@@ -208,7 +212,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                 }
             }
             if p.flags & FLAG_ANCHORS != 0 && matched.index != NO_ANCHOR {
-                best_class = matched.class;
+                best_class = anchor_class(&p, decoders, anchors, matched.index);
             }
             let mut loss_feature = 0.0;
             if !ray.masked() {

@@ -38,7 +38,8 @@ params! {
 
 kernel! {
     /// Drops unimportant anchors, merges stable duplicates, spawns anchors for features far from
-    /// their class's; counts what it did (alive, spawned, dropped, merged).
+    /// their class's; where all slots are taken, a class without any takes the place of the least
+    /// important one that is not its class's last. Counts what it did (alive, spawned, dropped, merged).
     pub static MAINTAIN_ANCHORS = "maintain_anchors" {
         workgroup_size: 64,
         params: MaintainAnchorsParams,
@@ -143,7 +144,6 @@ fn twin(dispatch: &CpuDispatch<'_>) {
     // A feature far from its class's anchors becomes one; classes without any come first, since
     // their distance is that to nothing.
     for _ in 0..p.spawns {
-        let Some(free) = (0..n).find(|i| set.class(*i) == FREE) else { break };
         let (mut furthest, mut chosen) = (p.spawn_distance, None);
         for ray in 0..p.rays as usize {
             let r = Ray::load(ray_words, ray);
@@ -161,6 +161,21 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         }
         let Some(ray) = chosen else { break };
         let class = Ray::load(ray_words, ray).class();
+        let mut slot = (0..n).find(|i| set.class(*i) == FREE);
+        if slot.is_none() && of_class[class as usize] == 0 {
+            // Full: the least important anchor that is not its class's last makes room.
+            let mut least = 1e30;
+            for i in 0..n {
+                if of_class[set.class(i) as usize] > 1 && set.value(i, 18) < least {
+                    (least, slot) = (set.value(i, 18), Some(i));
+                }
+            }
+            if let Some(i) = slot {
+                of_class[set.class(i) as usize] -= 1;
+                count(2);
+            }
+        }
+        let Some(free) = slot else { break };
         let feature = |ray: usize, k: usize| {
             load_f32(&state[ray * RAY_STATE_FLOATS + STATE_FEATURE as usize * 4 + k])
         };

@@ -1,7 +1,7 @@
 //! The field at single points.
-use super::decode_rays::nearest_anchor;
+use super::decode_rays::{anchor_class, nearest_anchor};
 use super::shared::{
-    FLAG_ANCHORS, FLAG_MAP, Grid, class_logit, color_hidden, color_output, geometry_decoder,
+    FLAG_ANCHORS, FLAG_MAP, Grid, color_hidden, color_output, geometry_decoder, likeliest_class,
     semantic_hidden, semantic_output, surface_weights,
 };
 use super::{CpuDispatch, store_f32, store_u32};
@@ -51,18 +51,11 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         if p.classes > 0 {
             let f = surface_grid.lookup(semantic, at);
             let feature = semantic_output(surface, &semantic_hidden(surface, &f));
-            let mut best = -1e30;
-            for c in 0..p.classes {
-                let logit = class_logit(decoders, &feature, p.classes, c);
-                if logit > best {
-                    best = logit;
-                    best_class = c;
-                }
-            }
+            best_class = likeliest_class(decoders, &feature, p.classes);
             if p.flags & FLAG_ANCHORS != 0 {
                 let nearest = nearest_anchor(&p, anchors, &feature, 255);
                 if nearest.index != NO_ANCHOR {
-                    best_class = nearest.class;
+                    best_class = anchor_class(&p, decoders, anchors, nearest.index);
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! Pixel and ray sampling.
 use super::CpuDispatch;
-use super::shared::{FLAG_DENSE, FLAG_GUIDED, RAY_MASKED, RAY_WORDS, Ray, random_u32};
+use super::shared::{FLAG_DENSE, FLAG_GUIDED, RAY_MASKED, RAY_WORDS, Ray, random_f32, random_u32};
 use crate::{kernels::store_u32, layout::FieldParams};
 
 kernel! {
@@ -14,6 +14,7 @@ kernel! {
             window: Read,
             color_images: Read,
             depth_images: Read,
+            class_rarity: Read,
             rays: ReadWrite,
         ],
     }
@@ -23,11 +24,20 @@ fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
     let (poses, window) = (dispatch.read_f32(0), dispatch.read_u32(1));
     let (color_images, depth_images) = (dispatch.read_u32(2), dispatch.read_u32(3));
-    let out = dispatch.write(4);
+    let class_rarity = dispatch.read_f32(4);
+    let out = dispatch.write(5);
     let pixels = p.width * p.height;
     let depth_stride = pixels.div_ceil(2);
     let raw_depth = |slot: u32, pixel: u32| {
         (depth_images[(slot * depth_stride + pixel / 2) as usize] >> (16 * (pixel & 1))) & 0xffff
+    };
+    // Rarity of a pixel's class: 0 without a class, -1 without depth.
+    let rarity = |slot: u32, pixel: u32| {
+        if raw_depth(slot, pixel) == 0 {
+            return -1.0;
+        }
+        let label = color_images[(slot * pixels + pixel) as usize] >> 24;
+        if label >= p.classes { 0.0 } else { class_rarity[label as usize] }
     };
     dispatch.for_each_invocation(|id| {
         let index = id as u32;
@@ -43,6 +53,18 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             raw = raw_depth(slot, pixel);
             if raw == 0 {
                 pixel = random_u32(p.seed, p.iteration, index, 1) % pixels;
+                raw = raw_depth(slot, pixel);
+            }
+            if p.classes > 0 && random_f32(p.seed, p.iteration, index, 3) < p.rare_share {
+                let mut best = rarity(slot, pixel);
+                for k in 1..p.rare_draws {
+                    let at = index.wrapping_mul(256).wrapping_add(k);
+                    let candidate = random_u32(p.seed, p.iteration, at, 4) % pixels;
+                    let rare = rarity(slot, candidate);
+                    if rare > best {
+                        (best, pixel) = (rare, candidate);
+                    }
+                }
                 raw = raw_depth(slot, pixel);
             }
         } else if p.flags & FLAG_GUIDED != 0 {

@@ -393,6 +393,18 @@ pub fn class_logit(decoders: &[f32], feature: &[f32; 16], classes: u32, c: u32) 
         + decoders[HEAD_FLOATS + classes as usize * 16 + c as usize]
 }
 
+/// The class of the largest logit; 255 without classes.
+pub fn likeliest_class(decoders: &[f32], feature: &[f32; 16], classes: u32) -> u32 {
+    let (mut best, mut class) = (-1e30, 255);
+    for c in 0..classes {
+        let logit = class_logit(decoders, feature, classes, c);
+        if logit > best {
+            (best, class) = (logit, c);
+        }
+    }
+    class
+}
+
 /// Light let through at a signed distance \[truncations\].
 pub fn phi(sharpness: f32, s: f32) -> f32 {
     1.0 / (1.0 + libm::expf(-sharpness * s))

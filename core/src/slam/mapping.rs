@@ -90,10 +90,11 @@ impl Slam {
         self.class_counts.add(self.info.classes.len(), frame);
         let ray_weights = self.class_counts.weights(self.config.loss.balance);
         let token_weights = self.class_counts.weights(self.config.fusion.balance);
+        let rarity = self.class_counts.rarity();
         let device = self.device()?;
         let mut r = Recording::default();
         device.upload_frame(&mut r, slot, frame);
-        device.upload_class_weights(&mut r, &ray_weights, &token_weights);
+        device.upload_class_weights(&mut r, &ray_weights, &token_weights, &rarity);
         device.engine.submit(&r)?;
 
         let first = self.keyframes.is_empty();
@@ -348,6 +349,7 @@ impl Slam {
                 loss: &loss,
                 iteration,
                 first: 0,
+                rare_share: if semantic { 0.0 } else { s.rare_share },
                 guidance,
             };
             rays = batch.frames * batch.rays_per_frame;

@@ -66,6 +66,7 @@ impl Slam {
                 loss: &loss,
                 iteration: 0,
                 first,
+                rare_share: 0.0,
                 guidance: Guidance::default(),
             };
             let mut r = Recording::default();

@@ -36,6 +36,11 @@ impl ClassCounts {
         let mean = raw.iter().zip(&self.0).map(|(w, n)| w * n).sum::<f64>() / total.max(1.0);
         raw.iter().map(|w| (w / mean.max(1e-9)).min(MAX_CLASS_WEIGHT) as f32).collect()
     }
+
+    /// How rare each class is: one over its pixels.
+    pub fn rarity(&self) -> Vec<f32> {
+        self.0.iter().map(|n| (1.0 / n.max(1.0)) as f32).collect()
+    }
 }
 
 /// Training steps of the fusion that are due in `count` iterations from the `first` on, of `steps`

@@ -136,6 +136,7 @@ impl Slam {
                 loss: &t.render_loss,
                 iteration: first_iteration + i,
                 first: 0,
+                rare_share: 0.0,
                 guidance: Guidance::default(),
             };
             device.record_forward(&mut r, &batch);

@@ -250,6 +250,7 @@ fn record(
         loss,
         iteration,
         first: 0,
+        rare_share: 0.0,
         guidance: Guidance::default(),
     };
     device.record_forward(r, &batch);
