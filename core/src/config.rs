@@ -93,9 +93,11 @@ pub struct SamplingConfig {
     pub near_m: f64,
     /// Intervals lighter than this carry no appearance or semantics.
     pub min_weight: f64,
-    /// Share of mapping's rays that seek rare classes; none does where labels are doubted, in the last
-    /// stage: wrong labels are rare, too.
+    /// Share of mapping's rays that seek rare classes.
     pub rare_share: f64,
+    /// The same while the semantics are trained alone; wrong labels are rare, too, and there they
+    /// would undo what doubting them brings.
+    pub semantic_rare_share: f64,
     /// Pixels that such a ray chooses from: the one whose class was seen least is taken.
     pub rare_draws: u32,
 }
@@ -376,7 +378,8 @@ impl Default for SamplingConfig {
             near_m: 0.02,
             min_weight: 1e-3,
             rare_share: 0.25,
-            rare_draws: 32,
+            semantic_rare_share: 0.05,
+            rare_draws: 24,
         }
     }
 }
@@ -603,6 +606,7 @@ impl Config {
         not_negative("sampling.near_m", s.near_m)?;
         not_negative("sampling.min_weight", s.min_weight)?;
         not_negative("sampling.rare_share", s.rare_share)?;
+        not_negative("sampling.semantic_rare_share", s.semantic_rare_share)?;
         count("sampling.rare_draws", s.rare_draws, 64, "1 to 64")?;
         for l in [&self.loss, &self.tracking.render_loss] {
             not_negative("loss.free_space", l.free_space)?;

@@ -1,11 +1,10 @@
 //! Gradients of the attention at its keys and values.
 use super::{
     CpuDispatch,
-    attend_tokens::{columns, pair_weight},
+    attend_tokens::{Pairs, columns},
     load_f32, store_f32,
-    tokens::{TILE, TokenParams, dot, sixteen},
+    tokens::{TILE, TokenParams, sixteen},
 };
-use alloc::vec::Vec;
 
 kernel! {
     /// Adds dL/dK and dL/dV. After `attend_queries`.
@@ -24,28 +23,27 @@ fn twin(dispatch: &CpuDispatch<'_>) {
     let (stride, query) = (p.stride as usize, p.query as usize);
     dispatch.for_each_workgroup(|group| {
         let first = group as usize * TILE;
-        let keys = first..(first + TILE).min(p.keys());
-        let mut sums: Vec<[[f32; 16]; 2]> = keys.clone().map(|_| [[0.0; 16]; 2]).collect();
+        let n = p.keys().saturating_sub(first).min(TILE);
+        let pairs = Pairs::load(&p, tokens, first, n);
+        let (mut dk, mut dv) = ([[0.0_f32; TILE]; 16], [[0.0_f32; TILE]; 16]);
         for token in 0..p.tokens() {
             let row = token * stride;
             let q = columns(tokens, row + query);
             let g = sixteen(gradient, row + p.output as usize);
             let log_sum = tokens[row + p.statistics as usize];
             let mean = load_f32(&gradient[row + p.statistics as usize]);
-            for (key, [dk, dv]) in keys.clone().zip(&mut sums) {
-                let at = p.key_token(key) * stride + query;
-                let w = pair_weight(q, columns(tokens, at + 16), log_sum);
-                let ds = 0.25 * w * (dot(&g, columns(tokens, at + 32)) - mean);
-                for c in 0..16 {
-                    dk[c] += ds * q[c];
-                    dv[c] += w * g[c];
+            let (w, ds) = pairs.weigh(&q.map(|x| x * 0.25), &g, log_sum, mean);
+            for c in 0..16 {
+                for j in 0..TILE {
+                    dk[c][j] += ds[j] * q[c];
+                    dv[c][j] += w[j] * g[c];
                 }
             }
         }
-        for (key, [dk, dv]) in keys.zip(&sums) {
-            let at = p.key_token(key) * stride + query;
+        for j in 0..n {
+            let at = p.key_token(first + j) * stride + query;
             for c in 0..16 {
-                for (to, v) in [(at + 16 + c, dk[c]), (at + 32 + c, dv[c])] {
+                for (to, v) in [(at + 16 + c, dk[c][j]), (at + 32 + c, dv[c][j])] {
                     store_f32(&gradient[to], load_f32(&gradient[to]) + v);
                 }
             }

@@ -1,7 +1,7 @@
 //! Gradients of the attention at its queries.
 use super::{
     CpuDispatch,
-    attend_tokens::{attended, columns, pair_weight},
+    attend_tokens::{Pairs, attended, columns},
     load_f32, store_f32,
     tokens::{NO_RESIDUAL, TILE, TokenParams, dot, sixteen},
 };
@@ -23,28 +23,38 @@ fn twin(dispatch: &CpuDispatch<'_>) {
     let (stride, query) = (p.stride as usize, p.query as usize);
     dispatch.for_each_workgroup(|group| {
         let first = group as usize * TILE;
-        for token in first..(first + TILE).min(p.tokens()) {
-            let row = token * stride;
-            let q = columns(tokens, row + query);
-            let g = sixteen(gradient, row + p.output as usize);
-            let mean = dot(&g, &attended(&p, tokens, token));
-            let log_sum = tokens[row + p.statistics as usize];
-            let mut dq = [0.0_f32; 16];
-            for key in 0..p.keys() {
-                let at = p.key_token(key) * stride + query;
-                let k = columns(tokens, at + 16);
-                let w = pair_weight(q, k, log_sum);
-                let ds = 0.25 * w * (dot(&g, columns(tokens, at + 32)) - mean);
-                (0..16).for_each(|c| dq[c] += ds * k[c]);
+        let count = p.tokens().saturating_sub(first).min(TILE);
+        let (mut q, mut g) = ([[0.0_f32; 16]; TILE], [[0.0_f32; 16]; TILE]);
+        let (mut mean, mut log_sum) = ([0.0_f32; TILE], [0.0_f32; TILE]);
+        for i in 0..count {
+            let row = (first + i) * stride;
+            q[i] = columns(tokens, row + query).map(|x| x * 0.25);
+            g[i] = sixteen(gradient, row + p.output as usize);
+            mean[i] = dot(&g[i], &attended(&p, tokens, first + i));
+            log_sum[i] = tokens[row + p.statistics as usize];
+        }
+        let mut dq = [[0.0_f32; 16]; TILE];
+        for tile in (0..p.keys()).step_by(TILE) {
+            let n = (p.keys() - tile).min(TILE);
+            let pairs = Pairs::load(&p, tokens, tile, n);
+            for i in 0..count {
+                let (_, ds) = pairs.weigh(&q[i], &g[i], log_sum[i], mean[i]);
+                for j in 0..n {
+                    let k = columns(tokens, p.key_token(tile + j) * stride + query + 16);
+                    (0..16).for_each(|c| dq[i][c] += ds[j] * k[c]);
+                }
             }
-            store_f32(&gradient[row + p.statistics as usize], mean);
+        }
+        for i in 0..count {
+            let row = (first + i) * stride;
+            store_f32(&gradient[row + p.statistics as usize], mean[i]);
             let add = |at: usize, v: f32| {
                 store_f32(&gradient[row + at], load_f32(&gradient[row + at]) + v);
             };
             for c in 0..16 {
-                add(query + c, dq[c]);
+                add(query + c, dq[i][c]);
                 if p.residual != NO_RESIDUAL {
-                    add(p.residual as usize + c, g[c]);
+                    add(p.residual as usize + c, g[i][c]);
                 }
             }
         }

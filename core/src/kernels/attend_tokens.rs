@@ -1,7 +1,7 @@
 //! Cross-attention over the tokens of an image, streamed over tiles (paper eqs. 1-4).
 use super::{
     CpuDispatch, load_f32, store_f32,
-    tokens::{NO_RESIDUAL, TILE, TokenParams, dot, exp_negative, sixteen},
+    tokens::{NO_RESIDUAL, TILE, TokenParams, exp_negative, sixteen},
 };
 
 kernel! {
@@ -89,7 +89,47 @@ pub(super) fn columns(tokens: &[f32], at: usize) -> &[f32; 16] {
     tokens[at..].first_chunk().unwrap_or(&[0.0; 16])
 }
 
-/// Weight of a pair.
-pub(super) fn pair_weight(q: &[f32; 16], k: &[f32; 16], log_sum: f32) -> f32 {
-    exp_negative((0.25 * dot(q, k) - log_sum).min(0.0))
+/// A tile of keys and values, transposed: scores of a query are then sums of vectors.
+pub(super) struct Pairs {
+    keys: [[f32; TILE]; 16],
+    values: [[f32; TILE]; 16],
+}
+
+impl Pairs {
+    /// Keys `first` to `first + n`; zeros behind them.
+    pub(super) fn load(p: &TokenParams, tokens: &[f32], first: usize, n: usize) -> Pairs {
+        let mut pairs = Pairs { keys: [[0.0; TILE]; 16], values: [[0.0; TILE]; 16] };
+        for j in 0..n {
+            let at = p.key_token(first + j) * p.stride as usize + p.query as usize;
+            let (k, v) = (columns(tokens, at + 16), columns(tokens, at + 32));
+            for c in 0..16 {
+                pairs.keys[c][j] = k[c];
+                pairs.values[c][j] = v[c];
+            }
+        }
+        pairs
+    }
+
+    /// For a query (scaled), the gradient at its output, its log-sum-exp and its mean gradient: the
+    /// pairs' weights, and the gradients at their scores.
+    pub(super) fn weigh(
+        &self,
+        q: &[f32; 16],
+        g: &[f32; 16],
+        log_sum: f32,
+        mean: f32,
+    ) -> ([f32; TILE], [f32; TILE]) {
+        let (mut w, mut ds) = ([0.0_f32; TILE], [0.0_f32; TILE]);
+        for c in 0..16 {
+            for j in 0..TILE {
+                w[j] += q[c] * self.keys[c][j];
+                ds[j] += g[c] * self.values[c][j];
+            }
+        }
+        for j in 0..TILE {
+            w[j] = exp_negative((w[j] - log_sum).min(0.0));
+            ds[j] = 0.25 * w[j] * (ds[j] - mean);
+        }
+        (w, ds)
+    }
 }

@@ -349,7 +349,7 @@ impl Slam {
                 loss: &loss,
                 iteration,
                 first: 0,
-                rare_share: if semantic { 0.0 } else { s.rare_share },
+                rare_share: if semantic { s.semantic_rare_share } else { s.rare_share },
                 guidance,
             };
             rays = batch.frames * batch.rays_per_frame;

@@ -92,6 +92,25 @@ struct SemanticPath {
     ratio_training: f64,
 }
 
+/// What fusion and suppressor add to a call of mapping.
+#[derive(Serialize)]
+struct Modules {
+    /// Iterations of a call.
+    iterations: u32,
+    /// The call without modules \[ms\].
+    call_ms: f64,
+    /// Training steps of the fusion in a call.
+    fusion_steps: u32,
+    /// One of them \[ms\].
+    fusion: Measured,
+    /// Updates of the anchors in a call.
+    anchor_updates: u32,
+    /// One update and one maintenance; a call has one maintenance \[ms\].
+    suppressor: Measured,
+    /// All of it over the call.
+    ratio: f64,
+}
+
 /// Which iteration.
 #[derive(Clone, Copy)]
 enum Kind {
@@ -99,6 +118,10 @@ enum Kind {
     Mapping,
     /// The forward half of mapping.
     Classes,
+    /// A training step of the fusion.
+    Fusion,
+    /// An update of the anchors, and their maintenance.
+    Suppressor,
 }
 
 /// Measure.
@@ -111,6 +134,7 @@ pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
     let mut device = set_up(chosen.engine, &config, CLASSES)?;
     let tracking = measure(&mut device, &config, Kind::Tracking, args.iterations, screen)?;
     let mapping = measure(&mut device, &config, Kind::Mapping, args.iterations, screen)?;
+    let modules = measure_modules(&mut device, &config, &mapping, args.iterations, screen)?;
     let (points, align_ms) = measure_align(&mut device, &config, args.iterations)?;
     let bytes = device.engine.allocated_bytes();
     drop(device);
@@ -128,6 +152,18 @@ pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
     );
     describe(&mut text, "tracking (render)", &tracking);
     describe(&mut text, "mapping", &mapping);
+    describe(&mut text, "fusion, a training step", &modules.fusion);
+    describe(&mut text, "suppressor, an update and a maintenance", &modules.suppressor);
+    let _ = writeln!(
+        text,
+        "\na mapping call of {} iterations: {:.1} ms; {} fusion steps, {} updates of the anchors and \
+         a maintenance add {:.1} %",
+        modules.iterations,
+        modules.call_ms,
+        modules.fusion_steps,
+        modules.anchor_updates,
+        100.0 * modules.ratio
+    );
     let _ = writeln!(
         text,
         "\ntracking (align), {points} points: {align_ms:.2} ms an iteration, with reading back"
@@ -161,6 +197,7 @@ pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
         "device_bytes": bytes,
         "tracking_render": tracking,
         "mapping": mapping,
+        "modules": modules,
         "semantic_path": semantic,
         "tracking_align": { "points": points, "ms_an_iteration": align_ms },
     });
@@ -170,8 +207,8 @@ pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
 
 fn describe(text: &mut String, name: &str, m: &Measured) {
     let (rays, samples) = (m.rays, m.samples_a_ray);
-    let _ =
-        writeln!(text, "\n{name}, {rays} x {samples}: {:.2} ms an iteration", m.ms_an_iteration);
+    let size = if rays > 0 { format!(", {rays} x {samples}") } else { String::new() };
+    let _ = writeln!(text, "\n{name}{size}: {:.2} ms an iteration", m.ms_an_iteration);
     let sum: f64 = m.stages.iter().map(|s| s.ms).sum();
     for s in &m.stages {
         let _ = writeln!(text, "  {:22}{:9.2} ms {:5.1} %", s.kernel, s.ms, 100.0 * s.ms / sum);
@@ -240,6 +277,13 @@ fn record(
             (WINDOW, config.mapping.rays, flags, &config.loss)
         }
         Kind::Classes => (WINDOW, config.mapping.rays, FLAG_GUIDED, &config.loss),
+        Kind::Fusion => {
+            let slot = FIRST_SLOT + iteration % WINDOW;
+            device.record_fusion_step(r, slot, config.mapping.rate_decoders);
+            return (0, 0);
+        }
+        // The rays are those of the mapping iteration before.
+        Kind::Suppressor => (WINDOW, config.mapping.rays, FLAG_GUIDED | FLAG_MAP, &config.loss),
     };
     let batch = Batch {
         frames,
@@ -253,6 +297,11 @@ fn record(
         rare_share: 0.0,
         guidance: Guidance::default(),
     };
+    if let Kind::Suppressor = kind {
+        device.record_anchor_update(r, &batch);
+        device.record_anchor_maintenance(r, &batch);
+        return (0, 0);
+    }
     device.record_forward(r, &batch);
     if let Kind::Classes = kind {
         return (rays, s.stratified + s.surface);
@@ -277,6 +326,8 @@ fn measure(
     let name = match kind {
         Kind::Tracking => "tracking",
         Kind::Mapping | Kind::Classes => "mapping",
+        Kind::Fusion => "fusion",
+        Kind::Suppressor => "suppressor",
     };
     let mut progress = screen.progress(name, 2 * iterations);
     let window: Vec<(u32, bool)> = (FIRST_SLOT..FIRST_SLOT + WINDOW)
@@ -328,6 +379,36 @@ fn measure(
     }
     progress.finish();
     Ok(Measured { rays, samples_a_ray, ms_an_iteration, stages })
+}
+
+/// The modules' parts, after a measured mapping iteration on the same device.
+fn measure_modules(
+    device: &mut Device,
+    config: &Config,
+    mapping: &Measured,
+    iterations: usize,
+    screen: Screen,
+) -> Result<Modules> {
+    let suppressor = measure(device, config, Kind::Suppressor, iterations, screen)?;
+    let fusion = measure(device, config, Kind::Fusion, iterations, screen)?;
+    let (calls, steps) = (config.mapping.iterations, config.fusion.steps);
+    let call_ms = mapping.ms_an_iteration * f64::from(calls);
+    let stage = |m: &Measured, name: &str| -> f64 {
+        m.stages.iter().filter(|s| s.kernel == name).map(|s| s.ms).sum()
+    };
+    let updates = calls;
+    let added = fusion.ms_an_iteration * f64::from(steps)
+        + stage(&suppressor, "update_anchors") * f64::from(updates)
+        + stage(&suppressor, "maintain_anchors");
+    Ok(Modules {
+        iterations: calls,
+        call_ms,
+        fusion_steps: steps,
+        fusion,
+        anchor_updates: updates,
+        suppressor,
+        ratio: added / call_ms,
+    })
 }
 
 /// Three maps: without classes, with a head once a ray, with one on every sample.
