@@ -1,5 +1,7 @@
 //! What the fuzz targets share: inputs of several named files, a mutator that keeps them whole,
 //! a limit on memory, and what is done with a recording.
+#![forbid(unsafe_code)]
+
 pub mod bundle;
 pub mod recordings;
 pub mod state;
