@@ -102,11 +102,11 @@ impl Run {
         let mut checkpoint = self.changed(bundle);
         let mut shown = block_on(Slam::restore(Engine::cpu(), &checkpoint));
         for _ in HASHES {
-            if let Err(SlamError::Checkpoint { field, expected, .. }) = &shown {
-                if HASHES.contains(&field.as_str()) {
-                    checkpoint.metadata.insert(field.clone(), expected.clone());
-                    shown = block_on(Slam::restore(Engine::cpu(), &checkpoint));
-                }
+            if let Err(SlamError::Checkpoint { field, expected, .. }) = &shown
+                && HASHES.contains(&field.as_str())
+            {
+                checkpoint.metadata.insert(field.clone(), expected.clone());
+                shown = block_on(Slam::restore(Engine::cpu(), &checkpoint));
             }
         }
         if let Ok(mut shown) = shown {
