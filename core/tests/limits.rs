@@ -17,6 +17,7 @@ use mte_slam_core::{
 use pollster::block_on;
 use recordings::recording;
 use std::{fmt::Display, io::Cursor};
+use zip::CompressionMethod;
 
 /// What the limits promise is 1 GiB; a picture may have 64 million pixels. The program and its
 /// threads take some themselves.
@@ -204,6 +205,8 @@ fn archive(name: &str, packed: &[u8], size: u32, count: u16) -> Vec<u8> {
 fn archives() {
     const LIMIT: u64 = 1 << 28;
     let opened = |bytes: Vec<u8>| ZipSource::new("room.zip", Cursor::new(bytes), LIMIT);
+    let usual = recordings::archive(&recording(Layout::ScanNet), CompressionMethod::Deflated);
+    open(Box::new(opened(usual).unwrap()), OpenOptions::default()).unwrap().frame(0).unwrap();
     let bomb = deflated_zeros(BOMB_BYTES);
     // The size that it claims is kept to, or is too much.
     let source = opened(archive("a.txt", &bomb, 100, 1)).unwrap();

@@ -106,7 +106,7 @@ fn a_device_lost_in_the_middle_leaves_a_run_to_go_on_with() {
     let Some(chosen) = gpu() else { return };
     let out = tempfile::tempdir().unwrap();
     let options = SyntheticOptions { width: 64, height: 48, frames: FRAMES, ..Default::default() };
-    let room = || SyntheticSequence::new(options.clone());
+    let room = || SyntheticSequence::new(options);
     let mut config = Config { seed: 5, ..Config::default() };
     config.tracking.align_pixels = 512;
     (config.mapping.every, config.mapping.rays) = (2, 400);
