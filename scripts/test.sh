@@ -33,6 +33,17 @@ cargo clippy --locked --workspace --all-targets -- -D warnings
 step "documentation"
 RUSTDOCFLAGS="${RUSTDOCFLAGS:-} -Dwarnings" cargo doc --locked --no-deps --workspace
 
+# Not run here, but kept in order; scripts/fuzz.sh runs them.
+step "fuzz targets"
+(
+    cd fuzz
+    cargo fmt --check
+    RUSTFLAGS="${RUSTFLAGS:-} --cfg fuzzing" cargo clippy --locked --no-default-features --all-targets \
+        --target-dir "${CARGO_TARGET_DIR:-../target}/fuzz" -- -D warnings
+    RUSTFLAGS="${RUSTFLAGS:-} --cfg fuzzing" cargo test --locked --no-default-features --lib \
+        --target-dir "${CARGO_TARGET_DIR:-../target}/fuzz"
+)
+
 step "compiler for no_std and wasm32"
 cross=0
 setup=$(sh ./scripts/wasm-toolchain.sh) || cross=$?

@@ -272,6 +272,32 @@ def images(r, out):
     text(out / "intrinsics.json", json.dumps({k: r.meta[k] for k in ("fx", "fy", "cx", "cy")}))
 
 
+def feature_maps(r, out):
+    """Mean colours of 8 x 8 pixels, channels x rows x columns, as every kind of feature map."""
+    h, w = r.meta["height"] // 8, r.meta["width"] // 8
+    for kind in ("npy-f4", "npy-f2", "safetensors-F32", "safetensors-F16"):
+        (out / kind).mkdir(parents=True)
+    for i in range(r.n):
+        means = r.color[i].reshape(h, 8, w, 8, 3).astype(np.float32).mean(axis=(1, 3))
+        grid = np.ascontiguousarray(means.transpose(2, 0, 1))
+        for kind in ("f4", "f2"):
+            np.save(out / f"npy-{kind}" / f"{i:06d}.npy", grid.astype("<" + kind))
+        for kind, dtype in (("F32", "<f4"), ("F16", "<f2")):
+            data, other = grid.astype(dtype).tobytes(), bytes(6)
+            header = {
+                "__metadata__": {"model": "mean colour"},
+                "mask": {"dtype": "U8", "shape": [6], "data_offsets": [len(data), len(data) + 6]},
+                "features": {"dtype": kind, "shape": grid.shape, "data_offsets": [0, len(data)]},
+            }
+            if kind == "F16":  # one tensor of any name
+                del header["mask"], header["__metadata__"]
+                header, other = {"patch tokens": header["features"]}, b""
+            head = json.dumps(header).encode()
+            head += b" " * (-len(head) % 8)
+            path = out / f"safetensors-{kind}" / f"{i:06d}.safetensors"
+            path.write_bytes(struct.pack("<Q", len(head)) + head + data + other)
+
+
 def zipped(folder, path, method):
     with zipfile.ZipFile(path, "w", method) as archive:
         for file in sorted(p for p in folder.rglob("*") if p.is_file()):
@@ -293,6 +319,7 @@ def main():
     nerfstudio(r, out / "nerfstudio")
     nerfstudio(r, out / "nerfstudio-opencv", opengl=False)
     images(r, out / "images")
+    feature_maps(r, out / "features")
     zipped(out / "scannet", out / "scannet.zip", zipfile.ZIP_DEFLATED)
     zipped(out / "sens-raw-zlib", out / "sens-deflated.zip", zipfile.ZIP_DEFLATED)
     zipped(out / "sens-png-raw", out / "sens-stored.zip", zipfile.ZIP_STORED)

@@ -26,20 +26,28 @@ pub struct FieldShape {
     cells_m: [[f64; 2]; 2],
 }
 
+/// Cells of the three planes over a grid. Saturates: a box that no map can hold, which a file or a
+/// unit of depth may well ask for, must have a size that every engine refuses.
+fn plane_cells([nx, ny, nz]: [u32; 3]) -> u32 {
+    let product = |a: u32, b: u32| u64::from(a) * u64::from(b);
+    let cells = product(nx, ny).saturating_add(product(nx, nz)).saturating_add(product(ny, nz));
+    u32::try_from(cells).unwrap_or(u32::MAX)
+}
+
 fn levels(extent_m: DVec3, cells_m: [f64; 2]) -> [Level; 2] {
-    let mut first = 0;
+    let mut first = 0u32;
     cells_m.map(|cell| {
-        let n = |x: f64| (x / cell).round() as u32 + 1;
-        let (nx, ny, nz) = (n(extent_m.x), n(extent_m.y), n(extent_m.z));
+        let n = |x: f64| ((x / cell).round() as u32).saturating_add(1);
+        let [nx, ny, nz] = [n(extent_m.x), n(extent_m.y), n(extent_m.z)];
         let level = [nx, ny, nz, first];
-        first += nx * ny + nx * nz + ny * nz;
+        first = first.saturating_add(plane_cells([nx, ny, nz]));
         level
     })
 }
 
-fn cell_count(levels: &[Level; 2]) -> usize {
+fn plane_floats(levels: &[Level; 2]) -> usize {
     let [nx, ny, nz, first] = levels[1];
-    first as usize + (nx * ny + nx * nz + ny * nz) as usize
+    (first as usize).saturating_add(plane_cells([nx, ny, nz]) as usize).saturating_mul(CHANNELS)
 }
 
 impl FieldShape {
@@ -97,12 +105,12 @@ impl FieldShape {
 
     /// Floats of the geometry planes.
     pub fn geometry_floats(&self) -> usize {
-        cell_count(&self.geometry) * CHANNELS
+        plane_floats(&self.geometry)
     }
 
     /// Floats of the appearance planes, and of the semantic ones.
     pub fn surface_floats(&self) -> usize {
-        cell_count(&self.surface) * CHANNELS
+        plane_floats(&self.surface)
     }
 
     /// Writes bounds and grids into kernel parameters.
@@ -196,6 +204,20 @@ pub fn initial_decoders(classes: u32, seed: u32) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn boxes_beyond_all_limits_have_sizes_beyond_all_limits() {
+        let config = FieldConfig::default();
+        let room = FieldShape::new(Bounds { min: DVec3::ZERO, max: DVec3::ONE }, &config);
+        for metres in [1e4, 1e6, 1e9, 1e15, 1e30, 1e200] {
+            let bounds = Bounds { min: DVec3::splat(-metres), max: DVec3::splat(metres) };
+            for shape in [Some(FieldShape::new(bounds, &config)), room.grown(bounds, &config)] {
+                let shape = shape.expect("a larger map");
+                let floats = shape.geometry_floats().min(shape.surface_floats()) as u64;
+                assert!(4 * floats > crate::engine::MAX_BUFFER_BYTES, "{metres}: {floats}");
+            }
+        }
+    }
 
     #[test]
     fn growing_keeps_every_cell() {

@@ -23,6 +23,7 @@ pub mod mesh;
 pub mod metrics;
 pub mod pose;
 pub mod recording;
+mod safetensors;
 pub mod sequence;
 pub mod shader;
 pub mod slam;

@@ -5,6 +5,8 @@
 //! `${EXPRESSION}` becomes a number, and the word `WORKGROUP_SIZE` becomes the kernel's `256u`
 //! style literal. Expressions are integer arithmetic (`+ - * / %`, comparisons, `&& || !`,
 //! parentheses) on literals, loop variables and [`CONSTANTS`].
+#[doc(hidden)]
+pub mod embed;
 mod expression;
 
 use crate::{kernels::Kernel, layout::CONSTANTS};
@@ -13,22 +15,28 @@ use alloc::{
     vec::Vec,
 };
 
+macro_rules! shared {
+    ($path:literal) => {
+        ($path, crate::embedded_shader!(concat!(env!("CARGO_MANIFEST_DIR"), "/../shaders/", $path)))
+    };
+}
+
 /// Files that shaders may import.
 pub const SHARED: &[(&str, &str)] = &[
-    ("shared/angle.wgsl", include_str!("../../shaders/shared/angle.wgsl")),
-    ("shared/appearance.wgsl", include_str!("../../shaders/shared/appearance.wgsl")),
-    ("shared/dispatch.wgsl", include_str!("../../shaders/shared/dispatch.wgsl")),
-    ("shared/geometry.wgsl", include_str!("../../shaders/shared/geometry.wgsl")),
-    ("shared/geometry_gradient.wgsl", include_str!("../../shaders/shared/geometry_gradient.wgsl")),
-    ("shared/geometry_mlp.wgsl", include_str!("../../shaders/shared/geometry_mlp.wgsl")),
-    ("shared/params.wgsl", include_str!("../../shaders/shared/params.wgsl")),
-    ("shared/planes.wgsl", include_str!("../../shaders/shared/planes.wgsl")),
-    ("shared/random.wgsl", include_str!("../../shaders/shared/random.wgsl")),
-    ("shared/rays.wgsl", include_str!("../../shaders/shared/rays.wgsl")),
-    ("shared/semantic.wgsl", include_str!("../../shaders/shared/semantic.wgsl")),
-    ("shared/surface.wgsl", include_str!("../../shaders/shared/surface.wgsl")),
-    ("shared/tokens.wgsl", include_str!("../../shaders/shared/tokens.wgsl")),
-    ("shared/weights.wgsl", include_str!("../../shaders/shared/weights.wgsl")),
+    shared!("shared/angle.wgsl"),
+    shared!("shared/appearance.wgsl"),
+    shared!("shared/dispatch.wgsl"),
+    shared!("shared/geometry.wgsl"),
+    shared!("shared/geometry_gradient.wgsl"),
+    shared!("shared/geometry_mlp.wgsl"),
+    shared!("shared/params.wgsl"),
+    shared!("shared/planes.wgsl"),
+    shared!("shared/random.wgsl"),
+    shared!("shared/rays.wgsl"),
+    shared!("shared/semantic.wgsl"),
+    shared!("shared/surface.wgsl"),
+    shared!("shared/tokens.wgsl"),
+    shared!("shared/weights.wgsl"),
 ];
 
 /// Limit on the total of unrolled iterations of one shader: more is a mistake, not a kernel.

@@ -10,7 +10,6 @@ use crate::{
 use anyhow::{Context, Result};
 use mte_slam_core::config::Config;
 use serde::Deserialize;
-use std::path::Path;
 use toml::{Table, Value};
 
 /// The configuration of a run, and the preset it started from.
@@ -25,16 +24,33 @@ pub struct Effective {
 /// Work out the configuration. `default_preset` is taken when neither the flag nor the file's
 /// `[run]` table names one.
 pub fn effective(args: &ConfigArgs, default_preset: &str) -> Result<Effective> {
-    let file = args.config.as_deref().map(read_file).transpose()?;
-    let recorded = file.as_ref().and_then(|f| f.preset.clone());
+    let Some(path) = &args.config else { return with_file(args, default_preset, None) };
+    let name = path.display().to_string();
+    match std::fs::read_to_string(path) {
+        Ok(text) => with_file(args, default_preset, Some((&name, &text))),
+        Err(e) => usage!("{name}: the configuration file cannot be read: {e}"),
+    }
+}
+
+/// The same with the file's name, for messages, and its text.
+pub fn with_file(
+    args: &ConfigArgs,
+    default_preset: &str,
+    file: Option<(&str, &str)>,
+) -> Result<Effective> {
+    let file = match file {
+        Some((name, text)) => Some((name, parse_file(name, text)?)),
+        None => None,
+    };
+    let recorded = file.as_ref().and_then(|(_, f)| f.preset.clone());
     let preset = args.preset.clone().or(recorded).unwrap_or_else(|| default_preset.to_owned());
     let Some(config) = Config::preset(&preset) else {
         let known = Config::PRESETS.join(", ");
         usage!("preset: found `{preset}`, expected one of {known}");
     };
     let mut table = Table::try_from(&config).context("the preset cannot be written as TOML")?;
-    if let (Some(path), Some(file)) = (&args.config, file) {
-        overlay(&mut table, &file.values, "", &path.display().to_string())?;
+    if let Some((name, file)) = file {
+        overlay(&mut table, &file.values, "", name)?;
     }
     for text in &args.set {
         let Some((key, value)) = text.split_once('=') else {
@@ -63,12 +79,7 @@ struct FileValues {
     preset: Option<String>,
 }
 
-fn read_file(path: &Path) -> Result<FileValues> {
-    let name = path.display();
-    let text = match std::fs::read_to_string(path) {
-        Ok(text) => text,
-        Err(e) => usage!("{name}: the configuration file cannot be read: {e}"),
-    };
+fn parse_file(name: &str, text: &str) -> Result<FileValues> {
     let mut values: Table = match text.parse() {
         Ok(table) => table,
         Err(e) => usage!("{name}: not TOML: {}", e.to_string().trim_end()),

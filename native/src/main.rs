@@ -1,5 +1,7 @@
 //! The command line of MTE-SLAM. Exit codes: 0 done, 1 something failed while working, 2 the
 //! command line or configuration is wrong.
+#![forbid(unsafe_code)]
+
 mod args;
 mod class_truth;
 mod commands;

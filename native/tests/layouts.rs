@@ -220,6 +220,33 @@ fn every_layout_is_read_back_to_the_same_frames() {
 }
 
 #[test]
+fn feature_maps_of_every_kind_are_read() {
+    let Some(f) = fixtures() else { return };
+    let (w, h) = (f.info.camera.width as usize, f.info.camera.height as usize);
+    // Values up to 255 have steps of 1/8 in half precision.
+    for (kind, tolerance) in
+        [("npy-f4", 1e-4), ("npy-f2", 0.07), ("safetensors-F32", 1e-4), ("safetensors-F16", 0.07)]
+    {
+        let features = source(&f.path(&format!("features/{kind}")));
+        let options = OpenOptions { features: Some(Box::new(features)), ..Default::default() };
+        let mut sequence = dataset::open(Box::new(source(&f.path("images"))), options).unwrap();
+        assert_eq!(sequence.info().feature_channels, 3, "{kind}");
+        for (i, frame) in f.frames.iter().enumerate() {
+            let map = sequence.frame(i).unwrap().features.unwrap();
+            assert_eq!((map.channels, map.height, map.width), (3, h / 8, w / 8), "{kind}");
+            for (at, found) in map.values.iter().enumerate() {
+                let (channel, row, column) =
+                    (at / (map.height * map.width), at / map.width % map.height, at % map.width);
+                let pixels = (0..64).map(|p| (row * 8 + p / 8) * w + column * 8 + p % 8);
+                let sum: f32 = pixels.map(|p| f32::from(frame.color[p][channel])).sum();
+                let off = (found - sum / 64.0).abs();
+                assert!(off <= tolerance, "{kind} {i}: {found} at {at}, {off} off");
+            }
+        }
+    }
+}
+
+#[test]
 fn occi_is_refused_by_name_and_raw_ids_need_no_table() {
     let Some(f) = fixtures() else { return };
     let m = source(&f.path("sens-raw-occi"));

@@ -1,4 +1,6 @@
 //! Test support: engines, and the comparison of a kernel's shader with its Rust twin.
+#![forbid(unsafe_code)]
+
 pub mod body;
 #[cfg(target_arch = "wasm32")]
 pub mod browser;

@@ -4,6 +4,8 @@
 //! Sources are read synchronously (a worker may do that), so the same readers serve the browser and
 //! the command line; the optimisation is cut into slices, between which the worker's own messages
 //! are handled.
+#![forbid(unsafe_code)]
+
 mod events;
 mod export;
 mod failure;

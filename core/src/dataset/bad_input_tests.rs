@@ -1,7 +1,7 @@
 //! Every kind of bad input gives an error that names the file, what was found and what was
 //! expected; and good input is read back as it was written.
 use super::{
-    features::tests::{npy, ramp},
+    features::tests::{npy, ramp, tensors},
     test_support::*,
     *,
 };
@@ -442,6 +442,15 @@ fn feature_maps_are_read_by_frame_number_and_checked() {
     assert_has(&error, &["000001.npy", "no such file in dino", "frame 1"]);
     let error = spoiled(&|m| m.insert("deep/1.npy", ramp(5, 2, 3)));
     assert_has(&error, &["frame number", "one file for each number"]);
+    // The formats may be mixed, but not for one frame.
+    let packed =
+        tensors(r#"{"tokens":{"dtype":"F16","shape":[5,1,1],"data_offsets":[0,10]}}"#, &[0x3c; 10]);
+    let mut mixed = maps.clone();
+    mixed.insert("deep/000001.safetensors", packed);
+    assert_has(&error_of(&replica(3), with(&mixed)), &["frame number", "000001.npy"]);
+    mixed.remove("deep/000001.npy");
+    let mut s = open(Box::new(replica(3)), with(&mixed)).unwrap();
+    assert_eq!(s.frame(1).unwrap().features.unwrap().values, [1.0585938; 5]);
     let empty = with(&MemorySource::new("none"));
     assert_has(&error_of(&replica(3), empty), &["none", "feature maps", "0 files", "000000.npy"]);
 }

@@ -17,8 +17,9 @@
 //!   `intrinsics.json` (the inner object alone, `depth_scale` for `scale`; it marks the layout
 //!   `images`, and fits images of its proportions in another size), `camera-intrinsics.txt` (a
 //!   3x3 or 4x4 matrix) or `camera.txt` (`fx fy cx cy [k1 k2 p1 p2 k3]`);
-//! - feature maps, in a folder of their own: `000000.npy`, ... by frame number, channels x height x
-//!   width, float32 or float16;
+//! - feature maps, in a folder of their own: `000000.npy` or `000000.safetensors` (the tensor
+//!   `features`, or the only one), ... by frame number, channels x height x width, float32 or
+//!   float16;
 //! - `bound.json`: `{"bound": [[x0, x1], [y0, y1], [z0, z1]]}` in metres;
 //! - `classes.json`: `{"7": {"name": "bed", "color": [86, 117, 191]}}`, colour optional. Without
 //!   it a [`ClassList`] can be given, and else every id in the images is a class;
@@ -33,6 +34,8 @@ mod decode;
 mod entries;
 mod features;
 mod folder;
+#[cfg(fuzzing)]
+pub mod fuzzing;
 mod images;
 pub mod inspect;
 mod intrinsics;

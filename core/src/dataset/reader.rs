@@ -109,8 +109,8 @@ pub struct OpenOptions {
     pub scale: f64,
     /// Where labels come from.
     pub labels: LabelSource,
-    /// Feature maps of the colour images: `000000.npy`, ... by frame number, float32 or float16,
-    /// channels x height x width, each over the whole image as it is stored.
+    /// Feature maps of the colour images: `000000.npy` or `000000.safetensors`, ... by frame number,
+    /// float32 or float16, channels x height x width, each over the whole image as it is stored.
     pub features: Option<Box<dyn Source>>,
     /// The classes, instead of those of any `classes.json`.
     pub classes: Option<ClassList>,

@@ -82,7 +82,7 @@ macro_rules! kernel {
         $(#[$doc])*
         pub static $id: $crate::kernels::Kernel = $crate::kernels::Kernel {
             name: $name,
-            wgsl: include_str!(concat!(
+            wgsl: $crate::embedded_shader!(concat!(
                 env!("CARGO_MANIFEST_DIR"), "/../shaders/", $name, ".wgsl"
             )),
             workgroup_size: $size,

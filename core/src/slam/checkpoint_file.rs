@@ -2,7 +2,7 @@
 //! Written here rather than by a library because its header order must not depend on a hash seed:
 //! the same run twice gives the same bytes.
 use super::{Checkpoint, Dtype, SlamError, Tensor};
-use crate::hash::Hasher;
+use crate::{hash::Hasher, safetensors};
 use alloc::{
     borrow::Cow,
     format,
@@ -26,6 +26,8 @@ impl Dtype {
     }
 }
 
+/// Longest header: the state of a run of a million frames, and more \[bytes\].
+const MAX_HEADER_BYTES: usize = 256 << 20;
 /// Metadata entry that holds the hash of everything else; only files have it.
 const CHECKSUM: &str = "checksum";
 
@@ -101,62 +103,19 @@ impl Checkpoint {
     /// # Errors
     /// [`SlamError::Checkpoint`] with what is cut off or not as it should be.
     pub fn from_bytes(bytes: &[u8]) -> Result<Checkpoint, SlamError> {
-        let Some((length, rest)) = bytes.split_first_chunk::<8>() else {
-            let found = format!("{} bytes", bytes.len());
-            return Err(wrong("file", found, "a header length of 8 bytes"));
-        };
-        let length = u64::from_le_bytes(*length);
-        if length > rest.len() as u64 {
-            let (found, expected) = (format!("{} bytes", rest.len()), format!("{length}"));
-            return Err(wrong("header", found, expected));
-        }
-        let (text, data) = rest.split_at(length as usize);
-        let header: Map<String, Value> =
-            serde_json::from_slice(text).map_err(|e| wrong("header", e, "JSON"))?;
+        let file = safetensors::parse(bytes, MAX_HEADER_BYTES)
+            .map_err(|e| wrong(e.field, e.found, e.expected))?;
         let mut checkpoint = Checkpoint::default();
-        let mut taken = 0;
-        for (name, value) in header {
-            if name == "__metadata__" {
-                checkpoint.metadata =
-                    serde_json::from_value(value).map_err(|e| wrong("metadata", e, "texts"))?;
-                continue;
-            }
-            let tensor = |part: &str| format!("tensor {name}: {part}");
-            let field = |key: &str| {
-                value
-                    .get(key)
-                    .ok_or_else(|| wrong(tensor(key), "nothing", "an entry of the header"))
-            };
-            let named = field("dtype")?;
-            let Some(dtype) = Dtype::ALL.into_iter().find(|d| named.as_str() == Some(d.name()))
-            else {
-                return Err(wrong(tensor("dtype"), named, "F32, F64, U16, U32 or U64"));
-            };
-            let shape: Vec<usize> = serde_json::from_value(field("shape")?.clone())
-                .map_err(|e| wrong(tensor("shape"), e, "whole numbers"))?;
-            let [start, end]: [usize; 2] =
-                serde_json::from_value(field("data_offsets")?.clone())
-                    .map_err(|e| wrong(tensor("data_offsets"), e, "two whole numbers"))?;
-            let Some(bytes) = data.get(start..end) else {
-                let found = format!("{} bytes of data; the file is cut off", data.len());
-                return Err(wrong(tensor("data"), found, format!("{end}")));
-            };
-            let expected = shape.iter().try_fold(dtype.size(), |n, &d| n.checked_mul(d));
-            if expected != Some(bytes.len()) {
-                let found = format!("{} bytes", bytes.len());
-                return Err(wrong(tensor("data"), found, format!("{} x {shape:?}", dtype.size())));
-            }
-            // Ranges that overlap would multiply what a small file takes in memory.
-            taken += bytes.len();
-            if taken > data.len() {
-                let found = format!("{taken} bytes of tensors in {} bytes", data.len());
-                return Err(wrong(tensor("data_offsets"), found, "ranges that do not overlap"));
-            }
-            checkpoint.tensors.push(Tensor { name, dtype, shape, bytes: bytes.to_vec() });
+        if let Some(metadata) = file.metadata {
+            checkpoint.metadata =
+                serde_json::from_value(metadata).map_err(|e| wrong("metadata", e, "texts"))?;
         }
-        if taken != data.len() {
-            let found = format!("{} bytes of data", data.len());
-            return Err(wrong("file", found, format!("{taken}, those of the tensors")));
+        for safetensors::Tensor { name, dtype: named, shape, bytes } in file.tensors {
+            let Some(dtype) = Dtype::ALL.into_iter().find(|d| named == d.name()) else {
+                let field = format!("tensor {name}: dtype");
+                return Err(wrong(field, named, "F32, F64, U16, U32 or U64"));
+            };
+            checkpoint.tensors.push(Tensor { name, dtype, shape, bytes: bytes.to_vec() });
         }
         if let Some(expected) = checkpoint.metadata.remove(CHECKSUM) {
             let found = checkpoint.checksum();

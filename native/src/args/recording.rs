@@ -39,8 +39,8 @@ pub struct SelectionArgs {
     /// of --labels].
     #[arg(long, value_name = "dataset|DIR|none", help_heading = "Recording")]
     pub truth_labels: Option<String>,
-    /// Folder of feature maps made of the colour images by any model, such as DINOv2: 000000.npy, ...
-    /// by frame number, float32 or float16, channels x height x width. The feature fusion reads
+    /// Folder of feature maps made of the colour images by any model, such as DINOv2: 000000.npy or
+    /// 000000.safetensors (the tensor `features`, or the only one), ... by frame number, float32 or float16, channels x height x width. The feature fusion reads
     /// them in place of the labels (which it is still trained by).
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath, help_heading = "Recording")]
     pub features: Option<PathBuf>,

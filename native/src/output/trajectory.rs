@@ -20,7 +20,8 @@ pub fn read_tum(name: &str, text: &str) -> Result<Vec<(f64, Pose)>> {
             .ok()
             .filter(|n: &Vec<f64>| n.iter().all(|x| x.is_finite()))
             .with_context(|| {
-                format!("{name} line {}: found `{line}`, expected 8 finite numbers", i + 1)
+                let found: String = line.chars().take(80).collect();
+                format!("{name} line {}: found `{found}`, expected 8 finite numbers", i + 1)
             })?;
         let [t, x, y, z, qx, qy, qz, qw] = numbers[..] else {
             bail!(

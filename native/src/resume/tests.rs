@@ -1,0 +1,151 @@
+//! What failures leave behind.
+use super::*;
+use crate::{
+    args::{EngineArgs, EngineChoice},
+    engine::{self, Chosen},
+    pipeline::process,
+    screen::Screen,
+};
+use mte_slam_core::{
+    frame::{Frame, SequenceInfo},
+    pose::Pose,
+    sequence::SequenceError,
+    synth::{SyntheticOptions, SyntheticSequence},
+};
+
+fn saver(out: &Path, saved: Option<usize>) -> Saver {
+    let sequence = SyntheticSequence::new(SyntheticOptions::tiny());
+    let mut saver = Saver::new(out, 50, &RunRecord::default(), &sequence, saved);
+    saver.begin(&Invocation::default()).unwrap();
+    saver
+}
+
+fn lost() -> anyhow::Error {
+    let message = "Unknown: reset by the driver".to_owned();
+    anyhow::Error::from(SlamError::Engine(EngineError::DeviceLost { message }))
+        .context("frame 123 (index 123)")
+}
+
+#[test]
+fn a_lost_device_names_the_checkpoint() {
+    let out = tempfile::tempdir().unwrap();
+    let error = saver(out.path(), Some(100)).failed(lost());
+    let kind = error.downcast_ref::<Interrupted>().expect("a typed error");
+    assert!(kind.device && kind.frames == Some(100));
+    let message = format!("{error:#}");
+    for part in ["after 100 frames", "--resume", "frame 123", "lost", "reset by the driver"] {
+        assert!(message.contains(part), "{part} in {message}");
+    }
+    let memory = EngineError::OutOfMemory { message: "8 GiB".to_owned() };
+    let error = saver(out.path(), None).failed(SlamError::Engine(memory).into());
+    let message = format!("{error:#}");
+    assert!(message.contains("before the first checkpoint (after 50 frames)"), "{message}");
+    // The mistakes of others stay what they are, until there is something to go on from.
+    let broken = || anyhow::anyhow!("000007.png: not a PNG");
+    assert!(saver(out.path(), None).failed(broken()).downcast_ref::<Interrupted>().is_none());
+    let error = saver(out.path(), Some(7)).failed(broken());
+    assert!(!error.downcast_ref::<Interrupted>().expect("a typed error").device);
+}
+
+#[test]
+fn the_short_form_is_told_from_the_whole_command() {
+    let of = |text: &str| Invocation {
+        arguments: text.split(' ').map(str::to_owned).collect(),
+        folder: PathBuf::new(),
+    };
+    assert_eq!(of("run --resume out").only_resumes(), Some("out"));
+    assert_eq!(of("-q run --resume=out --json").only_resumes(), Some("out"));
+    assert_eq!(of("run --resume out --engine cpu").only_resumes(), None);
+    assert_eq!(of("run room --resume").only_resumes(), None);
+}
+
+/// The graphics engine, or `None` with a message where there is no adapter.
+fn gpu() -> Option<Chosen> {
+    match engine::start(&EngineArgs { engine: EngineChoice::Gpu, adapter: None }) {
+        Ok(chosen) => Some(chosen),
+        Err(error) => {
+            let required = std::env::var("MTE_SLAM_REQUIRE_GPU").is_ok_and(|value| value == "1");
+            assert!(!required, "MTE_SLAM_REQUIRE_GPU=1: {error:#}");
+            println!("skipped: {error:#}");
+            None
+        }
+    }
+}
+
+/// A recording during which, before frame `at`, something happens.
+struct Eventful {
+    room: SyntheticSequence,
+    at: usize,
+    event: Box<dyn Fn()>,
+}
+
+impl Sequence for Eventful {
+    fn info(&self) -> &SequenceInfo {
+        self.room.info()
+    }
+
+    fn frame(&mut self, index: usize) -> Result<Frame, SequenceError> {
+        if index == self.at {
+            (self.event)();
+        }
+        self.room.frame(index)
+    }
+
+    fn truth(&self, index: usize) -> Option<Pose> {
+        self.room.truth(index)
+    }
+
+    fn time_s(&self, index: usize) -> f64 {
+        self.room.time_s(index)
+    }
+}
+
+#[test]
+fn a_device_lost_in_the_middle_leaves_a_run_to_go_on_with() {
+    const FRAMES: usize = 7;
+    let Some(chosen) = gpu() else { return };
+    let out = tempfile::tempdir().unwrap();
+    let options = SyntheticOptions { width: 64, height: 48, frames: FRAMES, ..Default::default() };
+    let room = || SyntheticSequence::new(options);
+    let mut config = Config { seed: 5, ..Config::default() };
+    config.tracking.align_pixels = 512;
+    (config.mapping.every, config.mapping.rays) = (2, 400);
+    (config.mapping.first_iterations, config.mapping.iterations) = (20, 4);
+    (config.mapping.final_iterations, config.mapping.semantic_iterations) = (4, 4);
+    (config.sampling.stratified, config.sampling.surface) = (12, 4);
+    let mut record = RunRecord::default();
+    record.set_engine(&chosen.record);
+    let quiet = Screen { quiet: true, json: false };
+
+    let event = chosen.engine.breaker().expect("a GPU engine");
+    let mut sequence = Eventful { room: room(), at: 5, event };
+    let slam = Slam::new(chosen.engine, config.clone(), sequence.info());
+    let mut slam = block_on(slam).unwrap();
+    let mut saver = Saver::new(out.path(), 2, &record, &sequence, None);
+    saver.begin(&Invocation::default()).unwrap();
+    let mut progress = quiet.progress("", FRAMES);
+    let begun = Processed::default();
+    let saving = Some(&mut saver);
+    let error = process(&mut slam, &mut sequence, "room", begun, saving, &mut progress);
+    let error = saver.failed(error.err().expect("the device is gone"));
+    let kind = error.downcast_ref::<Interrupted>().expect("a typed error");
+    assert!(kind.device && kind.frames == Some(4), "{error:#}");
+    let is_loss = |cause: &(dyn std::error::Error + 'static)| {
+        let cause = cause.downcast_ref::<SlamError>();
+        matches!(cause, Some(SlamError::Engine(EngineError::DeviceLost { .. })))
+    };
+    assert!(error.chain().any(is_loss), "{error:#}");
+    drop(slam);
+
+    // Another engine takes over what was saved, and says that it has.
+    let saved = find(out.path()).unwrap().expect("a checkpoint");
+    assert_eq!(saved.frames(), Some(4));
+    let mut sequence = room();
+    record.set_engine(
+        &engine::start(&EngineArgs { engine: EngineChoice::Cpu, adapter: None }).unwrap().record,
+    );
+    let (mut slam, begun) = saved.resume(Engine::cpu(), &config, &mut sequence, &record).unwrap();
+    let done = process(&mut slam, &mut sequence, "room", begun, None, &mut progress).unwrap();
+    assert_eq!((done.timings.len(), slam.trajectory().len()), (FRAMES, FRAMES));
+    assert!(done.notes[0].contains("resumed after frame 4 on another engine"), "{:?}", done.notes);
+}
