@@ -14,6 +14,7 @@ use crate::{
     screen::Screen,
     suite::{
         file::Suite,
+        guard::Guard,
         plan::{DataRoot, Plan, Run, State},
         process,
     },
@@ -60,6 +61,7 @@ pub fn run(args: &EvaluateArgs, screen: Screen) -> Result<()> {
         screen.note(&format!("{}: all {kept} runs finished before", out.display()));
         Vec::new()
     } else {
+        let _alone = Guard::take(&out)?;
         let jobs = args.jobs.unwrap_or_else(|| default_jobs(&plan));
         screen.note(&format!(
             "{}: {} runs, {kept} finished before, {jobs} at a time; into {}",

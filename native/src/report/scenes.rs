@@ -71,7 +71,7 @@ fn described(run: &RunResult) -> String {
         text("layout")
     );
     if let Some(first) = run.warnings.first() {
-        line += &format!(" Note: {first}.").replace("..", ".");
+        line += &format!(" Note: {}.", first.trim_end_matches('.'));
     }
     for (section, reason) in &run.absent {
         line += &format!(" No {section}: {reason}.");
