@@ -38,12 +38,12 @@ runs=$(ls "$out"/runs/*/metrics.json | wc -l)
 [ "$runs" -eq 2 ] || { echo "found $runs finished runs, expected 2" >&2; exit 1; }
 
 # Nothing is done twice, by Snakemake or by the program itself.
-times() { find "$out" -type f -exec stat -c '%n %Y' {} + | sort; }
-before=$(times)
+stamps() { find "$out" -type f -exec stat -c '%n %Y' {} + | sort; }
+before=$(stamps)
 sleep 1
 start
 "$MTE_SLAM" -q evaluate tiny --out "$out"
-[ "$before" = "$(times)" ] || { echo "a second start wrote files" >&2; exit 1; }
+[ "$before" = "$(stamps)" ] || { echo "a second start wrote files" >&2; exit 1; }
 
 # One run that is gone is made again, alone.
 rm -r "$out/runs/office.fast.base.seed1" "$out/done/office.fast.base.seed1" "$out/report.html"

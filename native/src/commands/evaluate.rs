@@ -37,7 +37,7 @@ pub fn run(args: &EvaluateArgs, screen: Screen) -> Result<()> {
     let plan = Plan::new(suite, &out, &data)?;
     plan.check_folder()?;
     if args.report_only {
-        return report(&plan, screen);
+        return report(&plan, true, screen);
     }
     let states: Vec<State> = plan.runs.iter().map(Run::state).collect::<Result<_>>()?;
     if args.dry_run {
@@ -71,7 +71,7 @@ pub fn run(args: &EvaluateArgs, screen: Screen) -> Result<()> {
         ));
         work(&todo, jobs.min(todo.len()), screen)?
     };
-    report(&plan, screen)?;
+    report(&plan, false, screen)?;
     if !failed.is_empty() {
         let reasons: Vec<String> =
             failed.iter().map(|(run, reason)| format!("\n  {run}: {reason}")).collect();
@@ -153,8 +153,8 @@ fn list(plan: &Plan, states: &[State], screen: Screen) -> Result<()> {
     Ok(())
 }
 
-/// Write the report of whatever runs are there.
-fn report(plan: &Plan, screen: Screen) -> Result<()> {
+/// Write the report of whatever runs are there; unless `anew`, one of the same results is kept.
+fn report(plan: &Plan, anew: bool, screen: Screen) -> Result<()> {
     let out = &plan.out;
     let results = Results::collect(plan);
     if results.finished().next().is_none() {
@@ -166,7 +166,8 @@ fn report(plan: &Plan, screen: Screen) -> Result<()> {
     let unchanged = |name: &str, text: &str| {
         fs::read_to_string(out.join(name)).is_ok_and(|found| found == text)
     };
-    if unchanged("results.json", &json) && unchanged("results.csv", &csv) && page.is_file() {
+    let same = unchanged("results.json", &json) && unchanged("results.csv", &csv);
+    if same && page.is_file() && !anew {
         screen.note(&format!("the report is up to date: {}", page.display()));
         screen.result("", &json);
         return Ok(());

@@ -12,6 +12,8 @@ const TOP: f64 = 30.0;
 const BOTTOM: f64 = 40.0;
 /// Points a line, at most: a pixel or two apart.
 const POINTS: usize = 500;
+/// Letters of a bar's name, at most.
+const NAME: usize = 34;
 /// Colours before they repeat.
 pub const COLORS: usize = 6;
 
@@ -35,13 +37,15 @@ pub fn lines(x_label: &str, y_label: &str, series: &[Series]) -> String {
     let px = |x: f64| LEFT + (WIDTH - LEFT - RIGHT) * x / x_most;
     let py = |y: f64| HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * y / y_most;
     let mut s = open(WIDTH, HEIGHT);
-    for y in ticks(y_most, 5.0) {
+    let step = nice_step(y_most / 5.0);
+    for y in ticks(y_most, step) {
         grid_line(&mut s, (LEFT, py(y)), (WIDTH - RIGHT, py(y)));
-        text(&mut s, LEFT - 6.0, py(y) + 4.0, "end", &number(y));
+        text(&mut s, LEFT - 6.0, py(y) + 4.0, "end", &number(y, step));
     }
-    for x in ticks(x_most, 8.0) {
+    let step = nice_step(x_most / 8.0);
+    for x in ticks(x_most, step) {
         grid_line(&mut s, (px(x), TOP), (px(x), HEIGHT - BOTTOM));
-        text(&mut s, px(x), HEIGHT - BOTTOM + 16.0, "middle", &number(x));
+        text(&mut s, px(x), HEIGHT - BOTTOM + 16.0, "middle", &number(x, step));
     }
     text(&mut s, WIDTH - RIGHT, HEIGHT - 6.0, "end", x_label);
     text(&mut s, LEFT, TOP - 12.0, "start", y_label);
@@ -106,7 +110,7 @@ fn panel(s: &mut String, paths: &[Path], left: f64, name: &str, (a, b): (usize, 
     let py = |v: f64| top + size * (0.5 - (v - centre.1) / span);
     let axis = ["x", "y", "z"];
     text(s, left, top - 8.0, "start", &format!("{name}: {} over {} [m]", axis[b], axis[a]));
-    let step = nice_step(span / 5.0);
+    let step = nice_step(span / 4.0);
     let marks = |centre: f64| {
         let first = ((centre - span / 2.0) / step).ceil() as i64;
         let last = ((centre + span / 2.0) / step).floor() as i64;
@@ -114,11 +118,11 @@ fn panel(s: &mut String, paths: &[Path], left: f64, name: &str, (a, b): (usize, 
     };
     for v in marks(centre.0) {
         grid_line(s, (px(v), top), (px(v), top + size));
-        text(s, px(v), top + size + 16.0, "middle", &number(v));
+        text(s, px(v), top + size + 16.0, "middle", &number(v, step));
     }
     for v in marks(centre.1) {
         grid_line(s, (left, py(v)), (left + size, py(v)));
-        text(s, left - 5.0, py(v) + 4.0, "end", &number(v));
+        text(s, left - 5.0, py(v) + 4.0, "end", &number(v, step));
     }
     for path in paths {
         let step = path.points.len().div_ceil(POINTS).max(1);
@@ -140,21 +144,23 @@ pub struct Bar {
 
 /// Bars below each other, all with the same named parts.
 pub fn bars(unit: &str, parts: &[&str], bars: &[Bar]) -> String {
-    let left = 230.0;
+    let longest = bars.iter().map(|b| b.name.chars().count().min(NAME)).max().unwrap_or(0);
+    let left = 16.0 + 6.6 * longest as f64;
     let row = 22.0;
     let height = TOP + row * bars.len() as f64 + BOTTOM;
     let most =
         bars.iter().map(|b| b.parts.iter().sum::<f64>()).fold(0.0, f64::max).max(1e-9) * 1.08;
     let px = |v: f64| left + (WIDTH - left - RIGHT - 20.0) * v / most;
     let mut s = open(WIDTH, height);
-    for x in ticks(most, 6.0) {
+    let step = nice_step(most / 6.0);
+    for x in ticks(most, step) {
         grid_line(&mut s, (px(x), TOP), (px(x), height - BOTTOM));
-        text(&mut s, px(x), height - BOTTOM + 16.0, "middle", &number(x));
+        text(&mut s, px(x), height - BOTTOM + 16.0, "middle", &number(x, step));
     }
     text(&mut s, WIDTH - RIGHT, height - 6.0, "end", unit);
     for (i, bar) in bars.iter().enumerate() {
         let y = TOP + row * i as f64;
-        text(&mut s, left - 8.0, y + 15.0, "end", &shortened(&bar.name, 34));
+        text(&mut s, left - 8.0, y + 15.0, "end", &shortened(&bar.name, NAME));
         let mut from = 0.0;
         for (k, part) in bar.parts.iter().enumerate() {
             let _ = write!(
@@ -168,7 +174,7 @@ pub fn bars(unit: &str, parts: &[&str], bars: &[Bar]) -> String {
             );
             from += part;
         }
-        text(&mut s, px(from) + 5.0, y + 15.0, "start", &number(from));
+        text(&mut s, px(from) + 5.0, y + 15.0, "start", &number(from, step / 10.0));
     }
     let entries: Vec<(&str, usize)> = parts.iter().enumerate().map(|(i, p)| (*p, i)).collect();
     legend(&mut s, WIDTH - RIGHT, TOP - 12.0, &entries);
@@ -236,24 +242,14 @@ fn shortened(name: &str, most: usize) -> String {
     start + "…"
 }
 
-fn ticks(most: f64, about: f64) -> impl Iterator<Item = f64> {
-    let step = nice_step(most / about);
+fn ticks(most: f64, step: f64) -> impl Iterator<Item = f64> {
     (0..=(most / step).floor() as i64).map(move |i| i as f64 * step)
 }
 
-/// As few digits as tell neighbouring ticks apart.
-fn number(v: f64) -> String {
-    let text = match v.abs() {
-        0.0 => "0".to_owned(),
-        a if a >= 100.0 => format!("{v:.0}"),
-        a if a >= 1.0 => format!("{v:.2}"),
-        _ => format!("{v:.4}"),
-    };
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        text
-    }
+/// As many digits as tell a number from one that is `step` away.
+fn number(v: f64, step: f64) -> String {
+    let digits = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{v:.digits$}")
 }
 
 #[cfg(test)]
@@ -289,10 +285,9 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_short() {
-        assert_eq!(
-            [0.0, 0.25, 1.5, 20.0, 300.0, 0.05].map(number),
-            ["0", "0.25", "1.5", "20", "300", "0.05"]
-        );
+    fn numbers_have_the_digits_of_their_step() {
+        let all = [(0.0, 0.5), (1.415, 0.005), (20.0, 5.0), (300.0, 100.0), (0.05, 0.01)];
+        let texts = all.map(|(v, step)| number(v, step));
+        assert_eq!(texts, ["0.0", "1.415", "20", "300", "0.05"]);
     }
 }

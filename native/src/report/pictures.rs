@@ -17,7 +17,9 @@ use std::{fs, io::Cursor, path::Path};
 const MOST_M: f64 = 0.05;
 /// Pictures of meshes are drawn so many times larger, then averaged.
 const OVERSAMPLING: u32 = 2;
-const PAPER: [f64; 3] = [255.0; 3];
+/// As the comparison sheets have it.
+const PAPER: [u8; 3] = [24, 26, 30];
+const INK: [u8; 3] = [235, 235, 235];
 
 /// An `img` element that holds a picture's bytes.
 pub fn img(bytes: &[u8], alternative: &str) -> String {
@@ -29,7 +31,8 @@ pub fn img(bytes: &[u8], alternative: &str) -> String {
     )
 }
 
-/// A picture file, at most `width` pixels wide, as PNG or JPEG, whichever is smaller.
+/// A picture file, at most `width` pixels wide and small ones enlarged pixel by pixel to about that,
+/// as PNG or, where that is much smaller, JPEG.
 pub fn small(path: &Path, width: u32) -> Result<Vec<u8>> {
     let name = path.display();
     let image = image::open(path).with_context(|| format!("{name}: not a whole picture"))?;
@@ -38,7 +41,8 @@ pub fn small(path: &Path, width: u32) -> Result<Vec<u8>> {
         let height = (image.height() * width).div_ceil(image.width()).max(1);
         image.resize_exact(width, height, FilterType::Triangle)
     } else {
-        image
+        let zoom = (width / image.width().max(1)).max(1);
+        image.resize_exact(image.width() * zoom, image.height() * zoom, FilterType::Nearest)
     };
     let encode = |format: ImageFormat| -> Result<Vec<u8>> {
         let mut bytes = Vec::new();
@@ -83,7 +87,7 @@ pub fn mesh_error(run: &RunResult, pose: &Pose, up: DVec3) -> Result<Vec<u8>> {
     let right = shaded(&ours, &error, &inside, pose);
     let (gap, bar) = (8usize, 34usize);
     let (w, h) = (w as usize, h as usize);
-    let mut canvas = Canvas::new(2 * w + gap, h + bar, [255; 3]);
+    let mut canvas = Canvas::new(2 * w + gap, h + bar, PAPER);
     canvas.image(0, 0, w, 1, &left);
     canvas.image(w + gap, 0, w, 1, &right);
     scale(&mut canvas, h + 8);
@@ -92,17 +96,16 @@ pub fn mesh_error(run: &RunResult, pose: &Pose, up: DVec3) -> Result<Vec<u8>> {
 
 /// The colours' meaning.
 fn scale(canvas: &mut Canvas, y: usize) {
-    let ink = [60, 66, 74];
     let (x, width) = (150, 400);
-    canvas.text(8, y + 2, 1, ink, "distance to truth");
+    canvas.text(8, y + 2, 1, INK, "distance to truth");
     for i in 0..width {
         canvas.fill(x + i, y, 1, 12, turbo(i as f64 / width as f64));
     }
     for i in 0..=5 {
         let at = x + i * width / 5;
-        canvas.text(at.saturating_sub(4), y + 16, 1, ink, &format!("{i}"));
+        canvas.text(at.saturating_sub(4), y + 16, 1, INK, &format!("{i}"));
     }
-    canvas.text(x + width + 16, y + 2, 1, ink, "cm and more");
+    canvas.text(x + width + 16, y + 2, 1, INK, "cm and more");
 }
 
 fn read_mesh(path: &Path) -> Result<Mesh> {
@@ -167,7 +170,9 @@ fn shaded(mesh: &Mesh, error_m: &[f32], camera: &Camera, pose: &Pose) -> Vec<[u8
     let (width, height) = (camera.width as usize, camera.height as usize);
     let color = |i: usize| -> [f64; 3] {
         let t = raster.triangle[i] as usize;
-        let Some(corners) = mesh.triangles.get(t) else { return PAPER };
+        let Some(corners) = mesh.triangles.get(t) else {
+            return PAPER.map(f64::from);
+        };
         let depth = f64::from(raster.depth_m[i]);
         let p = camera.back_project((i % width) as f64, (i / width) as f64, depth);
         let p = pose.transform_point(p);

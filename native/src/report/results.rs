@@ -284,7 +284,31 @@ fn fill(result: &mut RunResult, folder: &Path) -> Result<()> {
         result.absent = reasons.collect();
     }
     walk(&json, "", None, &mut result.figures);
+    complete_protocols(&json, &mut result.figures);
     Ok(())
+}
+
+/// A protocol is whole only with what other sections say: how views were rendered, and what the
+/// map's classes were learnt from.
+fn complete_protocols(json: &Value, figures: &mut BTreeMap<String, Figure>) {
+    let views = json["renders"]["protocol"].as_str();
+    let sequence = &json["sequence"];
+    let learnt = if sequence["labels"] == sequence["truth_labels"] {
+        "learnt from the labels that are scored against"
+    } else {
+        "learnt from other labels than those that are scored against"
+    };
+    for (path, figure) in figures {
+        let section = path.split('.').next().unwrap_or_default();
+        if ["depth", "color", "semantics"].contains(&section)
+            && let Some(views) = views
+        {
+            figure.protocol += &format!("; views {views}");
+        }
+        if path.contains("semantics") {
+            figure.protocol += &format!("; {learnt}");
+        }
+    }
 }
 
 /// Every number below an object that names a protocol.
@@ -342,6 +366,23 @@ mod tests {
             (1.5, "N")
         );
         assert_eq!(found["new.inner.x_cm"].protocol, "P2");
+    }
+
+    #[test]
+    fn protocols_are_made_whole() {
+        let json = serde_json::json!({
+            "renders": { "protocol": "at poses" },
+            "sequence": { "labels": "noisy", "truth_labels": "dataset" },
+        });
+        let figure = |p: &str| Figure { value: 0.0, protocol: p.to_owned() };
+        let mut figures = BTreeMap::new();
+        figures.insert("semantics.miou_percent".to_owned(), figure("mIoU"));
+        figures.insert("mesh.depth_cm".to_owned(), figure("M"));
+        complete_protocols(&json, &mut figures);
+        assert_eq!(figures["mesh.depth_cm"].protocol, "M");
+        let expected =
+            "mIoU; views at poses; learnt from other labels than those that are scored against";
+        assert_eq!(figures["semantics.miou_percent"].protocol, expected);
     }
 
     #[test]

@@ -58,7 +58,7 @@ fn described(run: &RunResult) -> String {
     let classes = match number("classes") {
         0 => "no labels".to_owned(),
         n => format!(
-            "{n} classes (labels `{}`, scored against `{}`)",
+            "{n} classes (labels: {}; scored against: {})",
             text("labels"),
             text("truth_labels")
         ),

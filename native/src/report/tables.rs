@@ -238,7 +238,12 @@ impl Tables<'_> {
         measures.sort_by_key(|m| (section(m), m.protocol.clone(), head_of(&m.path)));
         let column = |measure: Measure| {
             let head = heads[head_of(&measure.path)?].1;
-            let head = format!("{head}, {}", words(&section(&measure)));
+            let context = match section(&measure).as_str() {
+                // Beside those of meshes, which have protocols of their own.
+                "depth" => "views".to_owned(),
+                section => words(section),
+            };
+            let head = format!("{head}, {context}");
             Some(Column { measure, head, decimals: 2, factor: 1.0 })
         };
         measures.into_iter().filter_map(column).collect()
