@@ -7,7 +7,7 @@ use crate::resume::Invocation;
 pub use recording::{
     ClassArgs, ColorChoice, ConvertArgs, InspectArgs, SelectionArgs, SensorArgs, TargetLayout,
 };
-pub use suite::{EvaluateArgs, SynthArgs, SynthScene};
+pub use suite::EvaluateArgs;
 
 use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
 use glam::{DQuat, DVec3};
@@ -122,8 +122,7 @@ pub enum Command {
     #[command(
         long_about = "Write the built-in sequence to a folder in Replica (NICE-SLAM) layout with \
         labels, camera, bounds, class list and true mesh.\n\n\
-        Examples:\n    mte-slam synth data/room --frames 200 && mte-slam run data/room\n    \
-        mte-slam synth data/office --scene office --depth-noise"
+        Example:\n    mte-slam synth data/room --frames 200 && mte-slam run data/room"
     )]
     Synth(SynthArgs),
     /// Say what a recording holds, and warn of the usual mistakes
@@ -423,6 +422,20 @@ pub struct ViewArgs {
     /// A path of poses, `t tx ty tz qx qy qz qw` a line (TUM format).
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub path: Option<PathBuf>,
+}
+
+/// `synth`.
+#[derive(Debug, Args)]
+pub struct SynthArgs {
+    /// Folder to write to; must be empty or absent.
+    #[arg(value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub dir: PathBuf,
+    /// Number of frames.
+    #[arg(long, value_name = "N", default_value = "200", value_parser = at_least_one)]
+    pub frames: usize,
+    /// Image width in pixels; the height is three quarters of it.
+    #[arg(long, value_name = "PIXELS", default_value = "320", value_parser = picture_width)]
+    pub width: u32,
 }
 
 /// `serve`.

@@ -5,20 +5,16 @@ use crate::{
     configuration::{self, Effective},
     errors::usage,
     evaluation::MeshTruth,
-    output::new_folder::NewFolder,
     record::RunRecord,
     screen::Screen,
     source::{self, has_ending},
 };
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Result, anyhow};
 use mte_slam_core::{
     classes::UNLABELLED,
-    dataset::{
-        self, Axes, ClassList, ColorFormat, LabelSource, Layout, OpenOptions, RecordingWriter,
-        ReplicaWriter,
-    },
+    dataset::{self, Axes, ClassList, LabelSource, Layout, OpenOptions},
     frame::SequenceInfo,
-    mesh::{Mesh, write_ply},
+    mesh::Mesh,
     sequence::{Sequence, Source},
     synth::{SyntheticMesh, SyntheticOptions, SyntheticSequence},
 };
@@ -219,31 +215,6 @@ fn layout_named(name: &str) -> Result<Layout> {
 pub fn built_in(frames: usize, width: u32) -> SyntheticSequence {
     let height = width / 4 * 3;
     SyntheticSequence::new(SyntheticOptions { frames, width, height, ..Default::default() })
-}
-
-/// Write a built-in sequence and its mesh to a folder, in Replica's (NICE-SLAM's) layout; `done`
-/// hears how many frames are written.
-pub fn write_synthetic(
-    dir: &Path,
-    options: SyntheticOptions,
-    done: &mut dyn FnMut(usize),
-) -> Result<SequenceInfo> {
-    let target = NewFolder::prepare(dir)?;
-    let mut sequence = SyntheticSequence::new(options);
-    let info = sequence.info().clone();
-    // PNG, so that a run on the files sees exactly what `demo` sees.
-    let mut writer =
-        ReplicaWriter::new(&info, ColorFormat::Png, |name, bytes| target.write(name, bytes));
-    for index in 0..info.frames {
-        writer.write(&sequence.frame(index)?)?;
-        done(index + 1);
-    }
-    writer.finish()?;
-    let mesh = true_mesh(sequence.ground_truth_mesh()).mesh;
-    let ply = write_ply(&mesh).context("the true mesh cannot be written")?;
-    target.write("mesh.ply", &ply).context("mesh.ply: cannot be written")?;
-    target.publish()?;
-    Ok(info)
 }
 
 /// The built-in sequence's mesh as the core's mesh type; a vertex takes the class of its faces.

@@ -287,7 +287,7 @@ fn a_failed_run_is_reported_and_the_others_are_done() {
     );
     let folder = suite(&text);
     let folder = folder.path();
-    succeed(folder, &["synth", "broken", "--frames", "4", "--width", "64", "--scene", "office"]);
+    succeed(folder, &["synth", "broken", "--frames", "4", "--width", "64"]);
     let frame = folder.join("broken/results/depth000002.png");
     let good = fs::read(&frame).unwrap();
     fs::write(&frame, b"no picture").unwrap();

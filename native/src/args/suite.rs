@@ -1,6 +1,6 @@
-//! Suites, and the recordings that are built in.
-use super::{at_least_one, picture_width};
-use clap::{Args, ValueEnum, ValueHint};
+//! Suites.
+use super::at_least_one;
+use clap::{Args, ValueHint};
 use std::path::PathBuf;
 
 /// The manual of `evaluate`.
@@ -73,37 +73,4 @@ pub struct EvaluateArgs {
     /// Run nothing: make the report from whatever runs are there.
     #[arg(long)]
     pub report_only: bool,
-}
-
-/// `synth`.
-#[derive(Debug, Args)]
-pub struct SynthArgs {
-    /// Folder to write to; must be empty or absent.
-    #[arg(value_name = "DIR", value_hint = ValueHint::DirPath)]
-    pub dir: PathBuf,
-    /// Number of frames.
-    #[arg(long, value_name = "N", default_value = "200", value_parser = at_least_one)]
-    pub frames: usize,
-    /// Image width in pixels; the height is three quarters of it.
-    #[arg(long, value_name = "PIXELS", default_value = "320", value_parser = picture_width)]
-    pub width: u32,
-    /// Which scene.
-    #[arg(long, value_enum, value_name = "SCENE", default_value_t)]
-    pub scene: SynthScene,
-    /// Changes colours, patterns, small things and the shake of the hand; not the layout.
-    #[arg(long, value_name = "S", default_value_t = 0)]
-    pub seed: u64,
-    /// Noise, quantisation and holes as of a Kinect, instead of exact depth.
-    #[arg(long)]
-    pub depth_noise: bool,
-}
-
-/// A built-in scene.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum SynthScene {
-    /// A living room.
-    #[default]
-    Room,
-    /// An office.
-    Office,
 }

@@ -1,30 +1,31 @@
-//! `mte-slam synth`: a built-in sequence as files, in the layout of NICE-SLAM's Replica render.
-use crate::{
-    args::{SynthArgs, SynthScene},
-    input,
-    screen::Screen,
+//! `mte-slam synth`: the built-in sequence as files, in the layout of NICE-SLAM's Replica render.
+use crate::{args::SynthArgs, input, output::new_folder::NewFolder, screen::Screen};
+use anyhow::{Context, Result};
+use mte_slam_core::{
+    dataset::{ColorFormat, RecordingWriter, ReplicaWriter},
+    mesh::write_ply,
+    sequence::Sequence,
 };
-use anyhow::Result;
-use mte_slam_core::synth::{SceneKind, SyntheticOptions};
 
-/// Write a built-in sequence to a folder.
+/// Write the built-in sequence to a folder.
 pub fn run(args: &SynthArgs, screen: Screen) -> Result<()> {
-    let options = SyntheticOptions {
-        width: args.width,
-        height: args.width / 4 * 3,
-        frames: args.frames,
-        seed: args.seed,
-        scene: match args.scene {
-            SynthScene::Room => SceneKind::Room,
-            SynthScene::Office => SceneKind::Office,
-        },
-        depth_noise: args.depth_noise,
-    };
+    let target = NewFolder::prepare(&args.dir)?;
+    let mut sequence = input::built_in(args.frames, args.width);
+    let info = sequence.info().clone();
     let mut progress = screen.progress("writing frames", args.frames);
-    let info = input::write_synthetic(&args.dir, options, &mut |done| {
-        progress.set(done as u64, String::new);
-    })?;
+    // PNG, so that a run on the files sees exactly what `demo` sees.
+    let mut writer =
+        ReplicaWriter::new(&info, ColorFormat::Png, |name, bytes| target.write(name, bytes));
+    for index in 0..args.frames {
+        writer.write(&sequence.frame(index)?)?;
+        progress.set(index as u64 + 1, String::new);
+    }
+    writer.finish()?;
     progress.finish();
+    let mesh = input::true_mesh(sequence.ground_truth_mesh()).mesh;
+    let ply = write_ply(&mesh).context("the true mesh cannot be written")?;
+    target.write("mesh.ply", &ply).context("mesh.ply: cannot be written")?;
+    target.publish()?;
     let json = serde_json::json!({ "folder": args.dir, "frames": args.frames });
     let text = format!(
         "{} frames of {}x{} written to {dir}; next: mte-slam run {dir}\n",

@@ -1,4 +1,5 @@
 //! Suites: many runs over scenes, seeds, presets and ablations.
+pub mod data;
 pub mod file;
 pub mod guard;
 pub mod options;

@@ -1,9 +1,10 @@
 //! The runs of a suite: what each is made from, where it goes, and what is there already.
 use super::{
+    data,
     file::{Scene, Suite},
     options, run_file,
 };
-use crate::{configuration, errors::usage, input, output::folder::replace_file, resume};
+use crate::{configuration, errors::usage, output::folder::replace_file, resume};
 use anyhow::{Context, Result, bail};
 use serde_json::Value as Json;
 use std::{
@@ -168,7 +169,7 @@ impl Plan {
             let folder = self.out.join("data").join(synthetic.folder_name());
             if !folder.join("mesh.ply").is_file() {
                 say(&format!("writing the built-in recording {}", folder.display()));
-                input::write_synthetic(&folder, synthetic.options(), &mut |_| {})?;
+                data::write(&folder, synthetic.options())?;
             }
         }
         for run in &self.runs {
