@@ -330,7 +330,7 @@ fn bad_suites_say_what_is_wrong() {
     bad("\"fast\"", "\"fats\"", &["presets", "`fats`", "fast"]);
     bad("render_every = 3", "render_evry = 3", &["options", "`render_evry`", "`render_every`"]);
     bad("engine = \"cpu\"", "engine = \"tpu\"", &["'tpu'", "auto, gpu, cpu"]);
-    bad("mapping.rays=400", "mapping.raise=4", &["room.fast.base.seed1", "`mapping.rays`"]);
+    bad("mapping.rays=300", "mapping.raise=4", &["room.fast.base.seed1", "`mapping.rays`"]);
     bad("scene = \"room\"", "scene = \"hall\"", &["`hall`", "`room`"]);
     bad(
         "synthetic = { scene = \"room\", frames = 6, width = 64 }",

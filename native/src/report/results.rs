@@ -120,7 +120,11 @@ pub struct Results {
 impl Results {
     /// Collect what is there. A file that cannot be read makes its run a failed one.
     pub fn collect(plan: &Plan) -> Results {
-        let runs: Vec<RunResult> = plan.runs.iter().map(read_run).collect();
+        Results::of_runs(plan, plan.runs.iter().map(read_run).collect())
+    }
+
+    /// Of runs that have been read.
+    pub fn of_runs(plan: &Plan, runs: Vec<RunResult>) -> Results {
         let mut summary = Vec::new();
         for scene in &plan.suite.scenes {
             for preset in &plan.suite.presets {
@@ -223,28 +227,35 @@ fn summary_of(runs: &[RunResult], part: (&str, &str, &str)) -> Option<Summary> {
     })
 }
 
+impl RunResult {
+    /// Nothing of it is known yet.
+    pub fn new(run: &Run) -> RunResult {
+        RunResult {
+            name: run.name.clone(),
+            scene: run.scene.clone(),
+            preset: run.preset.clone(),
+            ablation: run.ablation.clone(),
+            seed: run.seed,
+            state: "missing",
+            reason: None,
+            program: None,
+            config_hash: None,
+            engine: Value::Null,
+            sequence: Value::Null,
+            started: Value::Null,
+            modules: None,
+            lost_frames: 0,
+            figures: BTreeMap::new(),
+            warnings: Vec::new(),
+            absent: BTreeMap::new(),
+            folder: run.folder.clone(),
+            mesh: run.mesh.clone(),
+        }
+    }
+}
+
 fn read_run(run: &Run) -> RunResult {
-    let mut result = RunResult {
-        name: run.name.clone(),
-        scene: run.scene.clone(),
-        preset: run.preset.clone(),
-        ablation: run.ablation.clone(),
-        seed: run.seed,
-        state: "missing",
-        reason: None,
-        program: None,
-        config_hash: None,
-        engine: Value::Null,
-        sequence: Value::Null,
-        started: Value::Null,
-        modules: None,
-        lost_frames: 0,
-        figures: BTreeMap::new(),
-        warnings: Vec::new(),
-        absent: BTreeMap::new(),
-        folder: run.folder.clone(),
-        mesh: run.mesh.clone(),
-    };
+    let mut result = RunResult::new(run);
     // A report takes finished runs of another version as they are, and says so.
     let finished = run.folder.join("metrics.json").is_file()
         && !run.folder.join(crate::resume::FOLDER).exists();

@@ -398,6 +398,10 @@ pub fn words(path: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{
+        report::results::Figure,
+        suite::{file::Suite, plan::DataRoot},
+    };
 
     #[test]
     fn only_numbers_of_views_are_left_out() {
@@ -405,6 +409,77 @@ mod tests {
         let expected = "P2P, 200000 samples; culled, 0.03 m in N views; no alignment";
         assert_eq!(without_counts(text), expected);
         assert_eq!(without_counts("rendered views 5"), "rendered views 5");
+    }
+
+    /// Two scenes and two seeds of figures that are made up.
+    fn made_up(change: impl Fn(&mut RunResult)) -> (Plan, Results) {
+        let text = "seeds = [1, 2]\npresets = ['fast']\nbenchmark = 'replica'\n\
+                    scenes = [{ name = 'a', synthetic = { scene = 'room', frames = 4 } },\n\
+                    { name = 'b', synthetic = { scene = 'office', frames = 4 } }]";
+        let suite = Suite::parse("s.toml", "s", text).unwrap();
+        let data = DataRoot::choose(None, &suite);
+        let plan = Plan::new(suite, std::path::Path::new("out"), &data).unwrap();
+        let figure = |run: &RunResult| {
+            let scene = if run.scene == "a" { 1.0 } else { 3.0 };
+            Figure { value: scene + 0.5 * f64::from(run.seed), protocol: "P in 8 views".to_owned() }
+        };
+        let runs = plan.runs.iter().map(|run| {
+            let mut run = RunResult::new(run);
+            run.state = "finished";
+            let figure = figure(&run);
+            run.figures.insert("semantics.miou_percent".to_owned(), figure);
+            change(&mut run);
+            run
+        });
+        let runs = runs.collect();
+        let results = Results::of_runs(&plan, runs);
+        (plan, results)
+    }
+
+    fn scene_tables((plan, results): &(Plan, Results)) -> Vec<Table> {
+        Tables { plan, results }.by_scene("mIoU (%)", 2, |p| p == "semantics.miou_percent")
+    }
+
+    #[test]
+    fn means_are_over_seeds_and_then_scenes() {
+        let made = made_up(|run| {
+            // The number of views is no other protocol.
+            if run.scene == "b" {
+                run.figures.values_mut().for_each(|f| f.protocol = "P in 20 views".to_owned());
+            }
+        });
+        let tables = scene_tables(&made);
+        assert_eq!(tables.len(), 1);
+        assert_eq!(tables[0].head, ["preset", "ablation", "a", "b", "mean"]);
+        let expected = ["fast", "base", "1.75 ± 0.35", "3.75 ± 0.35", "2.75 ± 0.35"];
+        assert_eq!(tables[0].rows, [expected]);
+        assert_eq!(tables[0].notes, ["Protocol: P in N views"]);
+        // A seed less of one scene is told, and is in no mean over scenes.
+        let made = made_up(|run| {
+            if run.scene == "b" && run.seed == 2 {
+                run.state = "missing";
+            }
+        });
+        let row = &scene_tables(&made)[0].rows[0];
+        assert_eq!(row[3..], ["3.50 (n = 1)", "2.50 (n = 1)"]);
+    }
+
+    #[test]
+    fn protocols_never_share_a_table_or_column() {
+        let made = made_up(|run| {
+            if run.scene == "b" {
+                run.figures.values_mut().for_each(|f| f.protocol = "Q".to_owned());
+            }
+        });
+        let tables = scene_tables(&made);
+        assert_eq!(tables.len(), 2);
+        assert_eq!(tables[0].rows[0][2..], ["1.75 ± 0.35", "-", "1.75 ± 0.35"]);
+        assert_eq!(tables[1].rows[0][2..], ["-", "3.75 ± 0.35", "3.75 ± 0.35"]);
+        let measured: Vec<&Table> = tables.iter().filter(|t| t.published).collect();
+        assert!(measured.is_empty());
+        let all = blocks(&made.0, &made.1).unwrap();
+        let published = all.iter().filter(|b| matches!(b, Block::Table(t) if t.published)).count();
+        assert_eq!(published, 5, "Tables II to VI");
     }
 
     #[test]

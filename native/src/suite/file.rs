@@ -164,7 +164,8 @@ impl Suite {
         Ok(suite)
     }
 
-    fn parse(source: &str, name: &str, text: &str) -> Result<Suite> {
+    /// The suite of a text; `source` starts messages, `name` is its name where it says none.
+    pub fn parse(source: &str, name: &str, text: &str) -> Result<Suite> {
         let mut suite: Suite = match toml::from_str(text) {
             Ok(suite) => suite,
             Err(e) => usage!("{source}: not a suite: {}", e.to_string().trim_end()),

@@ -70,6 +70,8 @@ pub fn run_all(
     let mut waiting: VecDeque<&Run> = runs.iter().copied().collect();
     let mut running: Vec<Running> = Vec::new();
     let mut done = 0;
+    // The time left is reckoned from here.
+    progress.set(0, String::new);
     loop {
         while running.len() < jobs.max(1)
             && let Some(run) = waiting.pop_front()
