@@ -6,6 +6,7 @@
 # MTE_SLAM_REQUIRE_TARGETS=1  fail, not skip, where no compiler for the two other targets can be had
 # MTE_SLAM_REQUIRE_BROWSER=1  fail, not skip, where there is no Chromium or no Node
 # MTE_SLAM_REQUIRE_PYTHON=1   fail, not skip, where no Python 3 has numpy and Pillow
+# MTE_SLAM_REQUIRE_SNAKEMAKE=1  fail, not skip, where there is no Snakemake
 # MTE_SLAM_CROSS              see scripts/wasm-toolchain.sh
 set -eu
 cd "$(dirname "$0")/.."
@@ -71,6 +72,9 @@ cargo test --locked --workspace --doc
 
 step "tests"
 cargo test --locked --workspace --all-targets --no-fail-fast
+
+step "workflow"
+./scripts/test-workflow.sh
 
 # The page and the kernels in a browser. Needs the compiler for wasm32 from above.
 if [ $cross -eq 0 ]; then

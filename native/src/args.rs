@@ -1,11 +1,13 @@
 //! The command line as clap reads it. The texts here are the program's manual, so they teach:
 //! what a command does, what it writes, and an example to copy.
 mod recording;
+mod suite;
 
 use crate::resume::Invocation;
 pub use recording::{
     ClassArgs, ColorChoice, ConvertArgs, InspectArgs, SelectionArgs, SensorArgs, TargetLayout,
 };
+pub use suite::EvaluateArgs;
 
 use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
 use glam::{DQuat, DVec3};
@@ -169,6 +171,9 @@ pub enum Command {
         mte-slam ablate data/room0 --labels segmented --seeds 3 --preset fast --frames 100 --out out/try"
     )]
     Ablate(AblateArgs),
+    /// Run a suite, scenes x seeds x presets x ablations, and report it beside published figures
+    #[command(long_about = suite::EVALUATE)]
+    Evaluate(EvaluateArgs),
     /// List adapters, their limits, and which engine `auto` would take
     Info(InfoArgs),
     /// Measure the kernels: milliseconds per stage and per iteration
@@ -288,8 +293,13 @@ pub struct OutputArgs {
 #[derive(Debug, Args)]
 pub struct RunArgs {
     /// Folder, .zip or .sens of the recording.
-    #[arg(value_name = "DATASET", value_hint = ValueHint::AnyPath, required_unless_present = "resume")]
+    #[arg(value_name = "DATASET", value_hint = ValueHint::AnyPath, required_unless_present_any = ["resume", "from"])]
     pub dataset: Option<PathBuf>,
+    /// Take the recording and all options from this file, as `evaluate` writes one for each of its
+    /// runs, and nothing else from the command line. The results go beside it; an interrupted run
+    /// is gone on with, and a finished one left alone.
+    #[arg(long, value_name = "RUN.toml", value_hint = ValueHint::FilePath, help_heading = "Interrupted runs")]
+    pub from: Option<PathBuf>,
     /// Which part of the recording, and how it is read.
     #[command(flatten)]
     pub selection: SelectionArgs,

@@ -57,6 +57,26 @@ pub fn start(args: &EngineArgs) -> Result<Chosen> {
     }
 }
 
+/// Whether the flags ask for, or `auto` would take, a graphics adapter; starts nothing.
+pub fn takes_adapter(args: &EngineArgs) -> bool {
+    match args.engine {
+        EngineChoice::Cpu => false,
+        EngineChoice::Gpu => true,
+        EngineChoice::Auto => args.adapter.is_some() || has_hardware(),
+    }
+}
+
+#[cfg(feature = "gpu")]
+fn has_hardware() -> bool {
+    let adapters = pollster::block_on(mte_slam_core::engine::list_adapters());
+    adapters.iter().any(|a| a.missing.is_empty() && is_hardware(&a.device_type))
+}
+
+#[cfg(not(feature = "gpu"))]
+fn has_hardware() -> bool {
+    false
+}
+
 /// Why `auto` passes over the adapters, when all that can be used are software.
 #[cfg(feature = "gpu")]
 fn only_software() -> Option<String> {

@@ -15,15 +15,18 @@ mod output;
 mod pipeline;
 mod progress;
 mod record;
+mod report;
 mod resume;
 mod screen;
 mod server;
 mod source;
+mod suite;
 
 use args::{Cli, Command};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    suite::process::end_with_parent();
     match resume::command_line().and_then(|cli| follow(&cli)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -46,6 +49,7 @@ fn follow(cli: &Cli) -> anyhow::Result<()> {
         Command::Inspect(args) => commands::inspect::run(args, screen),
         Command::Convert(args) => commands::convert::run(args, screen),
         Command::Serve(args) => commands::serve::run(args, screen),
+        Command::Evaluate(args) => commands::evaluate::run(args, screen),
         Command::Info(args) => commands::info::run(args, screen),
         Command::Ablate(args) => commands::ablate::run(args, screen),
         Command::Bench(args) => commands::bench::run(args, screen),

@@ -4,12 +4,13 @@
 //! (what was typed, and where) and `checkpoint.safetensors`, which a newer one replaces as a whole.
 //! A finished run removes the folder after its results are in place.
 use crate::{
-    args::Cli,
+    args::{Cli, Command},
     errors::usage,
     output::{checkpoint, folder::replace_file},
     pipeline::{Processed, status_name},
     progress::Progress,
     record::{self, RunRecord},
+    suite::run_file,
 };
 use anyhow::{Context, Result, bail};
 use clap::Parser;
@@ -58,12 +59,17 @@ impl Invocation {
 
     /// The folder, when this is `run --resume DIR` and nothing else that matters.
     fn only_resumes(&self) -> Option<&str> {
+        self.only("--resume")
+    }
+
+    /// The value of `flag`, when there is nothing else that matters after the command.
+    fn only(&self, flag: &str) -> Option<&str> {
         let quiet = ["-q", "--quiet", "--json"];
         let rest: Vec<&str> =
             self.arguments.iter().map(String::as_str).filter(|a| !quiet.contains(a)).collect();
         match rest[..] {
-            [_, "--resume", dir] => Some(dir),
-            [_, flag] => flag.strip_prefix("--resume="),
+            [_, name, value] if name == flag => Some(value),
+            [_, both] => both.strip_prefix(flag)?.strip_prefix('='),
             _ => None,
         }
     }
@@ -71,8 +77,8 @@ impl Invocation {
 
 /// The command line of this process, or the one that `--resume DIR` stands for.
 pub fn command_line() -> Result<Cli> {
-    let mut cli = Cli::parse();
     let invocation = Invocation::here();
+    let mut cli = from_file(Cli::parse(), &invocation)?;
     let Some(output) = cli.command.output_mut() else { return Ok(cli) };
     let dir = output.resume.take_if(|r| r.is_some()).flatten();
     let Some(dir) = dir else {
@@ -113,12 +119,28 @@ pub fn command_line() -> Result<Cli> {
     std::env::set_current_dir(&kept.folder).with_context(|| {
         format!("{}: the run was started there: {advice}", kept.folder.display())
     })?;
+    first = from_file(first, &kept)?;
     let Some(output) = first.command.output_mut() else {
         bail!("{name}: found a command that makes no run");
     };
     (output.out, output.resume, output.invocation) = (Some(out), Some(None), kept);
     (first.quiet, first.json) = (cli.quiet, cli.json);
     Ok(first)
+}
+
+/// With `run --from FILE`: what the file stands for.
+fn from_file(mut cli: Cli, invocation: &Invocation) -> Result<Cli> {
+    let Command::Run(args) = &mut cli.command else { return Ok(cli) };
+    let Some(file) = args.from.take() else { return Ok(cli) };
+    // An argument that is not Unicode leaves none to compare.
+    if !invocation.arguments.is_empty() && invocation.only("--from").is_none() {
+        usage!(
+            "--from {}: found other arguments beside it, expected none: the file has them all",
+            file.display()
+        );
+    }
+    *args = run_file::run_args(&file)?;
+    Ok(cli)
 }
 
 /// What this program keeps in a checkpoint.

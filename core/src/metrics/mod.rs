@@ -2,12 +2,14 @@
 //! protocols, so a figure without one means nothing.
 mod boundary;
 mod bvh;
+mod distance;
 mod image;
 mod semantic;
 mod surface;
 mod trajectory;
 
 pub use boundary::{BOUNDARY_PIXELS, BoundaryMeter, BoundaryReport};
+pub use distance::distances_to_surface;
 pub use image::{DepthMeter, DepthReport, MAX_PSNR_DB, PsnrMeter, PsnrReport};
 pub use semantic::{ConfusionMatrix, SMALL_SHARE_PERCENT, SemanticMeter, SemanticReport};
 pub use surface::{

@@ -4,6 +4,7 @@ pub mod bench;
 pub mod convert;
 pub mod demo;
 pub mod eval;
+pub mod evaluate;
 pub mod info;
 pub mod inspect;
 pub mod mesh;

@@ -138,7 +138,8 @@ impl OverSeeds {
         Some(OverSeeds { mean, standard_deviation })
     }
 
-    fn text(&self, decimals: usize, factor: f64) -> String {
+    /// As tables show it: `mean ± spread`.
+    pub fn text(&self, decimals: usize, factor: f64) -> String {
         let mean = self.mean * factor;
         match self.standard_deviation {
             Some(s) => format!("{mean:.decimals$} ± {:.decimals$}", s * factor),
@@ -428,7 +429,7 @@ impl Ablation {
 }
 
 /// A Markdown table with columns of even width, so that it reads as text, too.
-fn table(head: &[String], lines: &[Vec<String>]) -> String {
+pub fn table(head: &[String], lines: &[Vec<String>]) -> String {
     let all = || std::iter::once(head).chain(lines.iter().map(Vec::as_slice));
     let width = |column: usize| all().map(|l| l[column].chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..head.len()).map(width).collect();

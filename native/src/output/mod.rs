@@ -7,6 +7,7 @@ pub mod folder;
 pub mod font;
 pub mod meshes;
 pub mod metrics;
+pub mod metrics_line;
 pub mod new_folder;
 pub mod pictures;
 pub mod plot;

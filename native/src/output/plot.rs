@@ -262,7 +262,7 @@ pub fn anchors_svg(title: &str, history: &[(usize, u32, u32, u32, u32)], limit: 
 }
 
 /// The largest of 1, 2, 5 times a power of ten that is not above `rough` by more than half.
-fn nice_step(rough: f64) -> f64 {
+pub fn nice_step(rough: f64) -> f64 {
     let power = 10f64.powf(rough.log10().floor());
     let m = rough / power;
     power
