@@ -274,7 +274,7 @@ def pictures(table, out, dataset, metrics):
 def trajectory(table, out, metrics):
     truth = file_interface.read_tum_trajectory_file(str(out / "trajectory_gt.txt"))
     estimate = file_interface.read_tum_trajectory_file(str(out / "trajectory.txt"))
-    truth, estimate = sync.associate_trajectories(truth, estimate, 1e-4)
+    truth, estimate = sync.associate_trajectories(truth, estimate, max_diff=1e-4)
     for name, key in [("unaligned", "unaligned_cm"), ("aligned", "aligned_cm")]:
         if name == "aligned":
             estimate.align(truth, correct_scale=False)

@@ -7,6 +7,7 @@ use super::{
 };
 use crate::{camera::Camera, pose::Pose};
 use alloc::{vec, vec::Vec};
+use core::cmp::Ordering;
 use glam::DVec3;
 
 /// Triangles that are passed over together. Neighbours in a mesh's list are mostly neighbours in
@@ -85,8 +86,9 @@ fn may_be_in_view(
         &|p| camera.fy * p.y + (camera.cy + 0.5) * p.z,
         &|p| (h - 0.5 - camera.cy) * p.z - camera.fy * p.y,
     ];
-    // Not `all < 0`: a box with a NaN is looked at triangle by triangle.
-    sides.iter().all(|side| corners.iter().any(|&p| !(side(p) < 0.0)))
+    // A box with a NaN is looked at triangle by triangle.
+    let outside = |distance: f64| distance.partial_cmp(&0.0) == Some(Ordering::Less);
+    sides.iter().all(|side| corners.iter().any(|&p| !outside(side(p))))
 }
 
 #[cfg(test)]

@@ -11,8 +11,6 @@ use crate::{
 };
 use alloc::{format, string::String, vec::Vec};
 use glam::{DMat3, DVec2, DVec3};
-#[cfg(not(feature = "std"))]
-use num_traits::Float as _;
 use serde::Serialize;
 
 /// The camera of depth L1 by virtual views.
@@ -180,6 +178,35 @@ pub struct MeshDepthReport {
     pub missing_percent: f64,
 }
 
+/// What one view shows.
+#[derive(Default)]
+struct ViewSums {
+    /// Pixels with a true depth.
+    pixels: u64,
+    /// Those in which the estimate has one, too.
+    both: u64,
+    /// Sum of |estimate - truth| over these.
+    error_m: f64,
+    /// Sum of the true depth over the others.
+    missing_m: f64,
+}
+
+impl ViewSums {
+    fn of(truth: &[f32], estimate: &[f32]) -> ViewSums {
+        let mut v = ViewSums::default();
+        for (&t, &e) in truth.iter().zip(estimate).filter(|(t, _)| **t > 0.0 && **t < MAX_DEPTH_M) {
+            v.pixels += 1;
+            if e > 0.0 {
+                v.both += 1;
+                v.error_m += f64::from((e - t).abs());
+            } else {
+                v.missing_m += f64::from(t);
+            }
+        }
+        v
+    }
+}
+
 /// Compare the depth of two meshes, both culled alike, in virtual views.
 ///
 /// # Errors
@@ -193,35 +220,21 @@ pub fn depth_l1(
         mesh.check().map_err(|e| MetricsError::NoSurface { mesh: which, found: format!("{e}") })?;
     }
     let (ours, theirs) = (DepthRenderer::new(estimate), DepthRenderer::new(truth));
-    // Of a view: true pixels, pixels of both, sum over both, sum over the missing.
-    let of_view = |i: usize| {
+    let all = parallel::map(views.poses.len(), |i| {
         let truth = theirs.depth_m(&VIRTUAL_CAMERA, &views.poses[i], FAR_M);
         let estimate = ours.depth_m(&VIRTUAL_CAMERA, &views.poses[i], FAR_M);
-        let (mut pixels, mut both, mut sum, mut missing) = (0u64, 0u64, 0.0, 0.0);
-        for (&t, &e) in truth.iter().zip(&estimate).filter(|(t, _)| **t > 0.0 && **t < MAX_DEPTH_M)
-        {
-            pixels += 1;
-            if e > 0.0 {
-                both += 1;
-                sum += f64::from((e - t).abs());
-            } else {
-                missing += f64::from(t);
-            }
-        }
-        (pixels, both, sum, missing)
-    };
-    let all = parallel::map(views.poses.len(), of_view);
-    let counted: Vec<_> = all.into_iter().filter(|v| v.0 > MIN_PIXELS).collect();
-    let mean = |f: &dyn Fn(&(u64, u64, f64, f64)) -> Option<f64>| {
-        let values: Vec<f64> = counted.iter().filter_map(f).collect();
-        values.iter().sum::<f64>() / values.len() as f64
-    };
+        ViewSums::of(&truth, &estimate)
+    });
+    let counted: Vec<ViewSums> = all.into_iter().filter(|v| v.pixels > MIN_PIXELS).collect();
     if counted.is_empty() {
         let (wanted, rejected) = (views.wanted, views.rejected);
         return Err(MetricsError::NoViews { wanted, rejected });
     }
-    let pixels: u64 = counted.iter().map(|v| v.0).sum();
-    let both: u64 = counted.iter().map(|v| v.1).sum();
+    let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let pixels: u64 = counted.iter().map(|v| v.pixels).sum();
+    let both: u64 = counted.iter().map(|v| v.both).sum();
+    let of_all = |v: &ViewSums| (v.error_m + v.missing_m) / v.pixels as f64;
+    let of_both = |v: &ViewSums| (v.both > 0).then(|| v.error_m / v.both as f64);
     Ok(MeshDepthReport {
         protocol: format!(
             "Depth L1, mesh: both meshes in {} virtual views 500x500, f 300, far 20 m, inside the \
@@ -235,8 +248,8 @@ pub fn depth_l1(
         rejected_views: views.rejected,
         seed: views.seed,
         pixels,
-        l1_cm: 100.0 * mean(&|v| Some((v.2 + v.3) / v.0 as f64)),
-        l1_of_both_cm: 100.0 * mean(&|v| (v.1 > 0).then(|| v.2 / v.1 as f64)),
+        l1_cm: 100.0 * mean(counted.iter().map(of_all).collect()),
+        l1_of_both_cm: 100.0 * mean(counted.iter().filter_map(of_both).collect()),
         missing_percent: 100.0 * (pixels - both) as f64 / pixels as f64,
     })
 }

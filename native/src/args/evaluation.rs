@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 /// The long help of `eval`.
 pub const EVAL_MANUAL: &str = "Compute the figures of an output folder again, from trajectory.txt, \
-renders/ and mesh.ply and the recording they came from; no engine is started (but for --novel and \
---miou-protocol sni, which render the map of checkpoint.safetensors). Writes OUT/eval.json and \
+renders/ and mesh.ply and the recording they came from; no engine is started (but for novel \
+views and --miou-protocol sni, which render the map of checkpoint.safetensors). Writes OUT/eval.json and \
 prints the table. Works for files of other programs too, if they follow the same formats.
 
 Figures and their protocols (in brackets their section in metrics.json and eval.json):
