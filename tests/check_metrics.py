@@ -8,9 +8,10 @@
 
 DATASET is in Replica's (NICE-SLAM's) layout with a mesh.ply. Trajectory error is evo's; meshes are
 ray-cast and measured by Open3D (Embree), sampled by trimesh, matched by scipy's k-d tree; culling
-follows the peers' scripts in numpy. Views are those that were written out; samples are drawn here
-anew, so that figures of samples differ by chance (about 0.2 %). Ends with 1 if a figure is further
-off than 1 % (or 0.01 cm, or 0.1 percentage points).
+follows the peers' scripts in numpy. Views are those that were written out, and surface samples are
+drawn with the same random numbers (PCG, here in numpy), so that nothing differs by chance; with
+--own-samples they are trimesh's, and the limit is four standard errors where that is more. Ends
+with 1 if a figure is further off than 1 % (or 0.01 cm, or 0.1 percentage points).
 """
 import argparse
 import json
@@ -39,11 +40,9 @@ class Table:
     def __init__(self):
         self.rows, self.bad = [], 0
 
-    def add(self, name, ours, other, unit):
-        if ours is None:
-            return
+    def add(self, name, ours, other, unit, chance=0.0):
         floor = {"cm": 0.01, "%": 0.1, "m2": 0.005, "dB": 0.01, "": 0.0}[unit]
-        limit = max(0.01 * abs(other), floor)
+        limit = max(0.01 * abs(other), floor, chance)
         ok = abs(ours - other) <= limit
         self.bad += not ok
         share = 100 * (ours - other) / other if other else 0.0
@@ -152,7 +151,29 @@ def cull_eslam(mesh, camera, real, depths):
     return mesh.part(any_vertex(mesh, seen))
 
 
-def surface(table, name, ours, truth, report):
+def pcg(x):
+    """A permuted congruential hash of 32 bits (Jarzynski and Olano 2020)."""
+    state = (x * np.uint32(747796405) + np.uint32(2891336453)).astype(np.uint32)
+    word = ((state >> ((state >> np.uint32(28)) + np.uint32(4))) ^ state) * np.uint32(277803737)
+    return (word >> np.uint32(22)) ^ word
+
+
+def same_samples(mesh, stream, seed):
+    """The samples that mte-slam draws: number i of a stream depends on seed, stream and i alone."""
+    i = np.arange(SAMPLES, dtype=np.uint32)
+    own = pcg(np.uint32([stream])) ^ pcg(i)
+    key = pcg(np.uint32([seed]) + pcg(own))
+    numbers = [pcg(pcg(np.uint32([k])) ^ key).astype(np.uint64) for k in range(1, 7)]
+    join = lambda a, b: ((a << np.uint64(21)) ^ (b >> np.uint64(11))).astype(float) / 2.0**53
+    pick, root, along = (join(numbers[k], numbers[k + 1]) for k in (0, 2, 4))
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    cumulative = np.cumsum(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
+    t = np.searchsorted(cumulative, pick * cumulative[-1], side="right").clip(0, len(a) - 1)
+    root, along = np.sqrt(root)[:, None], along[:, None]
+    return a[t] * (1 - root) + b[t] * (root * (1 - along)) + c[t] * (root * along)
+
+
+def surface(table, name, ours, truth, report, own_samples):
     """Accuracy, completion and ratio; both meshes are culled already."""
     if "after ICP" in report["protocol"]:
         clouds = []
@@ -168,9 +189,12 @@ def surface(table, name, ours, truth, report):
     a, b = ours.as_trimesh(), truth.as_trimesh()
     table.add(f"{name}: area, ours", report["estimated_area_m2"], a.area, "m2")
     table.add(f"{name}: area, truth", report["true_area_m2"], b.area, "m2")
-    p = trimesh.sample.sample_surface(a, SAMPLES, seed=1)[0]
-    q = trimesh.sample.sample_surface(b, SAMPLES, seed=2)[0]
-    again = trimesh.sample.sample_surface(b, SAMPLES, seed=3)[0]
+    if own_samples:
+        draw = lambda mesh, k: trimesh.sample.sample_surface(mesh.as_trimesh(), SAMPLES, seed=k)[0]
+    else:
+        draw = lambda mesh, k: same_samples(mesh, k, report["seed"])
+    p, q, again = draw(ours, 0), draw(truth, 1), draw(truth, 2)
+    error = lambda values: 4 * np.sqrt(2) * values.std() / np.sqrt(SAMPLES) if own_samples else 0.0
     q_tree = cKDTree(q)
     exact = lambda points, mesh: mesh.scene.compute_distance(
         o3d.core.Tensor(points.astype(np.float32))
@@ -180,12 +204,14 @@ def surface(table, name, ours, truth, report):
         ("point_to_surface", exact(p, truth), exact(q, ours)),
     ]:
         r, short = report[kind], kind.replace("point_to_", "to ")
-        table.add(f"{name}: accuracy, {short}", r["accuracy_cm"], 100 * accuracy.mean(), "cm")
-        table.add(f"{name}: completion, {short}", r["completion_cm"], 100 * completion.mean(), "cm")
-        ratio = 100 * (completion < 0.05).mean()
-        table.add(f"{name}: completion ratio, {short}", r["completion_ratio_percent"], ratio, "%")
-    floor = 100 * q_tree.query(again)[0].mean()
-    table.add(f"{name}: floor by sampling", report["sampling_floor_cm"], floor, "cm")
+        for figure, key, values, unit in [
+            ("accuracy", "accuracy_cm", 100 * accuracy, "cm"),
+            ("completion", "completion_cm", 100 * completion, "cm"),
+            ("completion ratio", "completion_ratio_percent", 100.0 * (completion < 0.05), "%"),
+        ]:
+            table.add(f"{name}: {figure}, {short}", r[key], values.mean(), unit, error(values))
+    floor = 100 * q_tree.query(again)[0]
+    table.add(f"{name}: floor by sampling", report["sampling_floor_cm"], floor.mean(), "cm", error(floor))
 
 
 def depth_l1(table, ours, truth, views, report):
@@ -290,8 +316,9 @@ def main():
     arguments.add_argument("out", type=Path)
     arguments.add_argument("dataset", type=Path)
     arguments.add_argument("views", type=Path)
+    arguments.add_argument("--own-samples", action="store_true", help="let trimesh draw the samples")
     arguments = arguments.parse_args()
-    out, dataset = arguments.out, arguments.dataset
+    out, dataset, own = arguments.out, arguments.dataset, arguments.own_samples
     metrics = json.loads((out / "eval.json").read_text())
     views = json.loads(arguments.views.read_text())
     for key in ("real", "culling", "depth"):
@@ -309,13 +336,13 @@ def main():
         scale = json.loads((dataset / "cam_params.json").read_text())["camera"]["scale"]
         depths = [np.array(Image.open(f)) / scale for f in files[: len(real)]]
         pair = [cull_eslam(m, camera, real, depths) for m in (ours, truth)]
-        surface(table, "ESLAM", *pair, metrics["mesh"])
+        surface(table, "ESLAM", *pair, metrics["mesh"], own)
     if "mesh_frustum" in metrics:
         pair = [cull_frustum(m, camera, real) for m in (ours, truth)]
-        surface(table, "frustum", *pair, metrics["mesh_frustum"])
+        surface(table, "frustum", *pair, metrics["mesh_frustum"], own)
     if "mesh_coslam" in metrics:
         pair = [cull_coslam(m, camera, real, views["culling"]) for m in (ours, truth)]
-        surface(table, "Co-SLAM", *pair, metrics["mesh_coslam"])
+        surface(table, "Co-SLAM", *pair, metrics["mesh_coslam"], own)
         if "mesh_depth" in metrics:
             check_views(table, truth, pair[1], views)
             depth_l1(table, *pair, views, metrics["mesh_depth"])
