@@ -100,6 +100,12 @@ pub trait Sequence {
     }
     /// Ground-truth pose of frame `index` without decoding its images.
     fn truth(&self, index: usize) -> Option<Pose>;
+    /// A frame from a pose that is not of the sequence, where it can be made: `index` names it.
+    /// `None` inside solids, and for recordings.
+    fn view_from(&mut self, index: usize, world_from_camera: &Pose) -> Option<Frame> {
+        let _ = (index, world_from_camera);
+        None
+    }
     /// Time stamp of frame `index` \[s\] (the frame number where there are no stamps).
     fn time_s(&self, index: usize) -> f64;
     /// The data set's own number of frame `index`, as in [`Frame::number`].

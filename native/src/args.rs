@@ -1,9 +1,11 @@
 //! The command line as clap reads it. The texts here are the program's manual, so they teach:
 //! what a command does, what it writes, and an example to copy.
+mod evaluation;
 mod recording;
 mod suite;
 
 use crate::resume::Invocation;
+pub use evaluation::{CullChoice, EvalArgs, MiouProtocol};
 pub use recording::{
     ClassArgs, ColorChoice, ConvertArgs, InspectArgs, SelectionArgs, SensorArgs, TargetLayout,
 };
@@ -94,12 +96,7 @@ pub enum Command {
     )]
     Run(RunArgs),
     /// Compute the figures of an output folder again, from its files and the recording alone
-    #[command(
-        long_about = "Compute the figures of an output folder again, from trajectory.txt, renders/ \
-        and mesh.ply and the recording they came from; no engine is started. Writes OUT/eval.json \
-        and prints the table. Works for files of other programs too, if they follow the same \
-        formats.\n\nExample:\n    mte-slam eval out/room0-replica data/room0 --mesh data/room0_mesh.ply"
-    )]
+    #[command(long_about = evaluation::EVAL_MANUAL)]
     Eval(EvalArgs),
     /// Extract the mesh of an output folder's map again, for example finer
     #[command(
@@ -120,9 +117,10 @@ pub enum Command {
     Render(RenderArgs),
     /// Write the built-in sequence to a folder, in Replica layout
     #[command(
-        long_about = "Write the built-in sequence to a folder in Replica (NICE-SLAM) layout with \
+        long_about = "Write a built-in sequence to a folder in Replica (NICE-SLAM) layout with \
         labels, camera, bounds, class list and true mesh.\n\n\
-        Example:\n    mte-slam synth data/room --frames 200 && mte-slam run data/room"
+        Examples:\n    mte-slam synth data/room --frames 200 && mte-slam run data/room\n    \
+        mte-slam synth data/hall --scene hall --frames 1860 --novel 20"
     )]
     Synth(SynthArgs),
     /// Say what a recording holds, and warn of the usual mistakes
@@ -337,49 +335,6 @@ pub struct DemoArgs {
     pub output: OutputArgs,
 }
 
-/// `eval`.
-#[derive(Debug, Args)]
-pub struct EvalArgs {
-    /// Output folder of a run.
-    #[arg(value_name = "OUT", value_hint = ValueHint::DirPath)]
-    pub out: PathBuf,
-    /// The recording it came from.
-    #[arg(value_name = "DATASET", value_hint = ValueHint::DirPath)]
-    pub dataset: PathBuf,
-    /// Ground-truth mesh to compare with [default: mesh.ply in the recording's folder, if there].
-    #[arg(long, value_name = "GT.ply", value_hint = ValueHint::FilePath)]
-    pub mesh: Option<PathBuf>,
-    /// Layout of the recording's files, instead of recognising it.
-    #[arg(long, value_name = "LAYOUT")]
-    pub layout: Option<String>,
-    /// Which parts of the two meshes are compared.
-    #[arg(long, value_enum, default_value_t, value_name = "PROTOCOL")]
-    pub cull: CullChoice,
-    /// Align our mesh to the true one first (point-to-point ICP, 0.1 m), as the peers do.
-    #[arg(long)]
-    pub icp: bool,
-    /// Labels to compare with: `dataset` (the recording's own), a folder of label images, or
-    /// `none` [default: the recording's own, if it has any, else those of --labels].
-    #[arg(long, value_name = "dataset|DIR|none")]
-    pub truth_labels: Option<String>,
-    /// Labels that the run was given, to be scored too [default: as its config.toml says].
-    #[arg(long, value_name = "none|dataset|DIR")]
-    pub labels: Option<String>,
-    /// What the ids mean [default: as config.toml says].
-    #[command(flatten)]
-    pub classes: ClassArgs,
-}
-
-/// Which parts of a mesh count as observed; both meshes are culled alike.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum CullChoice {
-    /// In a frame, and no deeper than its measured depth plus 6 cm (ESLAM).
-    #[default]
-    Eslam,
-    /// In a frame's frustum, and not hidden by the mesh itself by more than 3 cm (Co-SLAM).
-    Coslam,
-}
-
 /// `mesh`.
 #[derive(Debug, Args)]
 pub struct MeshArgs {
@@ -436,6 +391,24 @@ pub struct SynthArgs {
     /// Image width in pixels; the height is three quarters of it.
     #[arg(long, value_name = "PIXELS", default_value = "320", value_parser = picture_width)]
     pub width: u32,
+    /// Which scene.
+    #[arg(long, value_enum, default_value_t, value_name = "SCENE")]
+    pub scene: SceneChoice,
+    /// Write that many views from other poses to DIR/novel; `run` and `eval` score them apart.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub novel: usize,
+}
+
+/// A built-in scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum SceneChoice {
+    /// A living room of 5 x 4.5 x 2.6 m.
+    #[default]
+    Room,
+    /// An office of 5.4 x 4.4 x 2.7 m.
+    Office,
+    /// A hall of 10 x 9 x 8 m.
+    Hall,
 }
 
 /// `serve`.

@@ -3,21 +3,19 @@ use crate::{
     class_truth::ClassTruth,
     output::metrics::{Metrics, RenderRecord, SemanticFigures},
 };
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use mte_slam_core::{
     classes::ClassTable,
     frame::{Frame, SequenceInfo},
-    mesh::{self, CullProtocol, Keep, Mesh, Visibility},
     metrics::{
-        self, AteReport, ConfusionMatrix, DepthMeter, PosePair, PsnrMeter, SemanticMeter,
-        SurfaceOptions, SurfaceReport, TrajectoryError, align_rigid, ate, evaluate_surface,
+        AteReport, ConfusionMatrix, DepthMeter, PosePair, PsnrMeter, SemanticMeter,
+        TrajectoryError, align_rigid, ate,
     },
     pose::Pose,
-    sequence::Sequence,
     slam::{PoseEstimate, View},
     track::odometry::ColourRegistration,
 };
-use std::{borrow::Cow, path::Path};
+use std::borrow::Cow;
 
 /// A trajectory's error.
 pub struct TrajectoryScore {
@@ -173,90 +171,4 @@ impl ViewScores {
             unlabelled_id,
         });
     }
-}
-
-/// A true mesh.
-pub struct MeshTruth {
-    /// The mesh, in the world frame of the true poses.
-    pub mesh: Mesh,
-}
-
-impl MeshTruth {
-    /// Read a PLY file.
-    pub fn read(path: &Path) -> Result<MeshTruth> {
-        let name = path.display();
-        let bytes =
-            std::fs::read(path).with_context(|| format!("{name}: the true mesh cannot be read"))?;
-        let mesh =
-            mesh::read_ply(&bytes).with_context(|| format!("{name}: not a mesh in PLY format"))?;
-        if mesh.triangles.is_empty() {
-            bail!("{name}: the true mesh: found no faces, expected a triangle mesh");
-        }
-        Ok(MeshTruth { mesh })
-    }
-
-    /// The mesh of `flag`, or else `mesh.ply` in the recording's folder, or why there is none.
-    /// A file that is there but unreadable is an error.
-    pub fn find(flag: Option<&Path>, dataset: &Path) -> Result<Result<MeshTruth, String>> {
-        if let Some(path) = flag {
-            return Ok(Ok(MeshTruth::read(path)?));
-        }
-        let path = dataset.join("mesh.ply");
-        if path.is_file() {
-            return Ok(Ok(MeshTruth::read(&path)?));
-        }
-        Ok(Err(format!("there is no true mesh ({}; --mesh names another)", path.display())))
-    }
-}
-
-/// ESLAM's culling: in a frame, and no deeper than its measured depth plus the truncation.
-pub const CULL_ESLAM: CullProtocol = CullProtocol::SensorDepth { truncation_m: 0.06 };
-/// Co-SLAM's culling: in a frame's frustum, and not hidden in a rendering of the mesh itself.
-pub const CULL_COSLAM: CullProtocol = CullProtocol::RenderedDepth { tolerance_m: 0.03 };
-/// Frames that decide what was observed; more of a long sequence add little.
-const CULLING_VIEWS: usize = 200;
-
-/// Compare a mesh with the true one, both culled to what frames at true poses observed. `icp`
-/// aligns ours to the true one first.
-pub fn mesh(
-    mut ours: Mesh,
-    truth: MeshTruth,
-    sequence: &mut dyn Sequence,
-    protocol: CullProtocol,
-    icp: bool,
-) -> Result<SurfaceReport> {
-    let info = sequence.info().clone();
-    let mut true_mesh = truth.mesh;
-    let mut seen_of_ours = Visibility::new(&ours);
-    let mut seen_of_truth = Visibility::new(&true_mesh);
-    let stride = info.frames.div_ceil(CULLING_VIEWS).max(1);
-    let mut views = 0;
-    for index in (0..info.frames).step_by(stride) {
-        let Some(world_from_camera) = sequence.truth(index) else { continue };
-        let frame = sequence.frame(index)?;
-        let view = mesh::View {
-            camera: &info.camera,
-            world_from_camera,
-            depth: &frame.depth,
-            depth_unit_m: info.depth_unit_m,
-        };
-        seen_of_ours.add_view(&ours, &view, protocol);
-        seen_of_truth.add_view(&true_mesh, &view, protocol);
-        views += 1;
-    }
-    if views == 0 {
-        bail!("no frame has a true pose, so what was observed is not known");
-    }
-    mesh::cull(&mut ours, &seen_of_ours, Keep::AnySeen);
-    mesh::cull(&mut true_mesh, &seen_of_truth, Keep::AnySeen);
-    let options = SurfaceOptions::default();
-    if icp {
-        let aligned = metrics::icp(&ours, &true_mesh, 0.1, options.seed)?;
-        ours.transform(&aligned);
-    }
-    let mut report = evaluate_surface(&ours, &true_mesh, &options)?;
-    let alignment = if icp { "after ICP" } else { "no alignment" };
-    report.protocol =
-        format!("{}; {} in {views} views; {alignment}", report.protocol, protocol.name());
-    Ok(report)
 }

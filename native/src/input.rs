@@ -4,7 +4,7 @@ use crate::{
     class_truth::ClassTruth,
     configuration::{self, Effective},
     errors::usage,
-    evaluation::MeshTruth,
+    mesh_evaluation::MeshTruth,
     record::RunRecord,
     screen::Screen,
     source::{self, has_ending},

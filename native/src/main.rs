@@ -11,6 +11,8 @@ mod errors;
 mod evaluation;
 mod input;
 mod memory;
+mod mesh_evaluation;
+mod novel;
 mod output;
 mod pipeline;
 mod progress;

@@ -4,7 +4,9 @@ use crate::{
     class_truth::ClassTruth,
     configuration::{self, Effective},
     engine::{self, Chosen},
-    evaluation::{self, MeshTruth, ViewScores},
+    evaluation::{self, ViewScores},
+    mesh_evaluation::{self, MeshProtocols, MeshTruth},
+    novel,
     output::{
         checkpoint, classes,
         folder::OutputFolder,
@@ -147,7 +149,7 @@ fn work(
         process(&mut slam, sequence.as_mut(), &record.dataset, begun, saving, &mut progress)?;
     progress.finish();
     let labelled = slam.labelled();
-    let Processed { timings, earlier_s, notes, .. } = processed;
+    let Processed { timings, earlier_s, notes, finish_s } = processed;
     record.colour_scale = slam.colour_registration().scale;
     // Without a single label the map's classes mean nothing: none are shown.
     let of_map = shown_classes(&slam);
@@ -165,7 +167,8 @@ fn work(
         estimates.iter().filter(|e| e.status == TrackingStatus::Lost).map(|e| e.frame).collect();
 
     write_anchors(&slam, folder, &mut metrics)?;
-    write_trajectory(folder, sequence.as_ref(), &estimates, &truth, &mut metrics)?;
+    let truth_from_estimate =
+        write_trajectory(folder, sequence.as_ref(), &estimates, &truth, &mut metrics)?;
     let class_truth = if labelled || info.classes.is_empty() {
         job.class_truth
     } else {
@@ -176,6 +179,9 @@ fn work(
         let chosen: Vec<_> = estimates.iter().step_by(output.render_every).copied().collect();
         let sequence = sequence.as_mut();
         render_views(&mut slam, sequence, folder, &chosen, &of_map, &mut scores, screen)?;
+        let frames: Vec<usize> = chosen.iter().map(|e| e.frame).collect();
+        let aligned = truth_from_estimate;
+        novel::of_run(&mut slam, sequence, &record, &frames, aligned, &mut metrics, screen)?;
     }
     scores.report(pictures::unlabelled_id(&info.classes), &mut metrics);
     write_classes(folder, &of_map, &scores, &metrics)?;
@@ -186,15 +192,9 @@ fn work(
         let mesh = extract_mesh(&mut slam, resolution, screen)?;
         meshes::write(&mesh, &of_map, &mut |name, bytes| folder.write(name, bytes))?;
         match job.truth_mesh {
-            Ok(true_mesh) => {
-                screen.note("comparing the mesh with the true one");
-                let protocol = evaluation::CULL_ESLAM;
-                match evaluation::mesh(mesh, true_mesh, sequence.as_mut(), protocol, false) {
-                    Ok(report) => metrics.mesh = Some(report),
-                    Err(reason) => {
-                        metrics.absent.insert("mesh", format!("{reason:#}"));
-                    }
-                }
+            Ok(truth) => {
+                let (wanted, sequence) = (MeshProtocols::default(), sequence.as_mut());
+                mesh_evaluation::score(mesh, truth, sequence, &wanted, &mut metrics, screen);
             }
             Err(reason) => {
                 metrics.absent.insert("mesh", reason);
@@ -210,11 +210,11 @@ fn work(
     folder.write("config.toml", config_file(&effective.config, &record)?.as_bytes())?;
 
     metrics.warnings.splice(0..0, sequence.warnings().into_iter().chain(notes));
-    let mut time = time_figures(&timings, start);
+    let mut time = time_figures(&timings, finish_s, start);
     time.wall_s += earlier_s;
     time.checkpoints = saver.figures();
     metrics.time = Some(time);
-    metrics.memory = Some(memory_figures(slam.memory_bytes() as u64));
+    metrics.memory = Some(memory_figures(&slam));
     folder.write("metrics.json", metrics.to_json()?.as_bytes())?;
     Ok(metrics)
 }
@@ -361,13 +361,14 @@ fn write_anchors(slam: &Slam, folder: &OutputFolder, metrics: &mut Metrics) -> R
     Ok(())
 }
 
+/// Gives back what aligns the estimate with the truth; the identity where that is not known.
 fn write_trajectory(
     folder: &OutputFolder,
     sequence: &dyn Sequence,
     estimates: &[PoseEstimate],
     truth: &[Option<Pose>],
     metrics: &mut Metrics,
-) -> Result<()> {
+) -> Result<Pose> {
     let text = write_tum(estimates.iter().map(|e| (e.time_s, e.world_from_camera)));
     folder.write("trajectory.txt", text.as_bytes())?;
     let known: Vec<_> =
@@ -376,6 +377,7 @@ fn write_trajectory(
         folder.write("trajectory_gt.txt", write_tum(known.iter().copied()).as_bytes())?;
     }
     let score = evaluation::trajectory(estimates, truth, |_| true);
+    let aligned = score.as_ref().map_or(Pose::IDENTITY, |s| s.truth_from_estimate);
     let mut subtitle = format!("{} frames", estimates.len());
     let mut points: Vec<DVec3> =
         estimates.iter().map(|e| e.world_from_camera.translation).collect();
@@ -416,7 +418,7 @@ fn write_trajectory(
         metrics.trajectory_without_lost =
             evaluation::trajectory(estimates, truth, not_lost).ok().map(|s| s.report);
     }
-    Ok(())
+    Ok(aligned)
 }
 
 /// Render frames at their estimated poses; write the pictures, and score them.
@@ -567,26 +569,30 @@ fn configuration_record(effective: &Effective) -> Result<ConfigurationRecord> {
     })
 }
 
-fn time_figures(timings: &[Timing], start: Instant) -> TimeFigures {
+fn time_figures(timings: &[Timing], last_optimisation_s: f64, start: Instant) -> TimeFigures {
     TimeFigures {
-        protocol: "wall clock a frame; reading and decoding images left out, evaluation too",
+        protocol: "wall clock a frame, median and 95th percentile; without reading and decoding \
+                   images, without evaluation, and without the last optimisation, which is given \
+                   apart. The first frame is not tracked; its mapping may compile pipelines",
         tracking: Spread::of(timings.iter().skip(1).map(|t| t.tracking_s)),
         mapping: Spread::of(timings.iter().map(|t| t.mapping_s).filter(|s| *s > 0.0)),
         total: Spread::of(timings.iter().map(|t| t.total_s)),
+        last_optimisation_s,
         wall_s: start.elapsed().as_secs_f64(),
         checkpoints: None,
     }
 }
 
-fn memory_figures(device_bytes: u64) -> MemoryFigures {
+fn memory_figures(slam: &Slam) -> MemoryFigures {
     let (peak_host_bytes, peak_host_unknown) = match crate::memory::peak_host_bytes() {
         Ok(bytes) => (Some(bytes), None),
         Err(reason) => (None, Some(reason)),
     };
     MemoryFigures {
-        protocol: "host: peak resident set of the process (with software adapters it holds the device's buffers); device: buffers of the engine",
+        protocol: "host: peak resident set of the whole program, evaluation included (without a hardware adapter it holds the device's buffers, too); device: sum of the engine's buffers, without the driver's own",
         peak_host_bytes,
         peak_host_unknown,
-        device_bytes,
+        device_bytes: slam.memory_bytes() as u64,
+        peak_device_bytes: slam.peak_memory_bytes(),
     }
 }

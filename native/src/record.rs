@@ -1,7 +1,11 @@
 //! `config.toml`: the configuration with, in `[run]`, where it was used and on what.
-use crate::{configuration, output::metrics::EngineRecord};
+use crate::{
+    args::{ClassArgs, SelectionArgs, SensorArgs},
+    configuration,
+    output::metrics::EngineRecord,
+};
 use anyhow::{Context, Result};
-use mte_slam_core::config::Config;
+use mte_slam_core::{config::Config, dataset::GivenCamera};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -91,6 +95,26 @@ impl Default for RunRecord {
 }
 
 impl RunRecord {
+    /// The flags that open the recording as the run did.
+    pub fn selection(&self) -> SelectionArgs {
+        SelectionArgs {
+            layout: None,
+            frames: (self.frames > 0).then_some(self.frames),
+            stride: self.stride,
+            start: self.start,
+            scale: self.scale,
+            sensor: SensorArgs {
+                camera: self.camera.as_deref().and_then(GivenCamera::from_numbers),
+                depth_scale: self.depth_scale,
+                axes: self.axes.clone(),
+            },
+            labels: self.labels.clone(),
+            truth_labels: None,
+            features: None,
+            classes: ClassArgs { classes: self.classes.clone(), unlabelled: self.unlabelled },
+        }
+    }
+
     /// Note the engine.
     pub fn set_engine(&mut self, engine: &EngineRecord) {
         self.engine.clone_from(&engine.kind);

@@ -32,17 +32,19 @@ pub(super) struct Entry<T> {
 pub(super) struct Table<T> {
     entries: Vec<Option<Entry<T>>>,
     allocated_words: usize,
+    peak_words: usize,
 }
 
 impl<T> Table<T> {
     pub fn new() -> Self {
-        Self { entries: Vec::new(), allocated_words: 0 }
+        Self { entries: Vec::new(), allocated_words: 0, peak_words: 0 }
     }
 
     pub fn insert(&mut self, name: &'static str, words: usize, data: T) -> BufferId {
         let id = BufferId(self.entries.len() as u32);
         self.entries.push(Some(Entry { name, words, data }));
         self.allocated_words += allocated_words(words);
+        self.peak_words = self.peak_words.max(self.allocated_words);
         id
     }
 
@@ -54,6 +56,10 @@ impl<T> Table<T> {
 
     pub fn allocated_bytes(&self) -> u64 {
         4 * self.allocated_words as u64
+    }
+
+    pub fn peak_bytes(&self) -> u64 {
+        4 * self.peak_words as u64
     }
 
     /// The buffer, or an error that says what was to be done with it.

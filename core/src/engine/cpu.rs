@@ -139,6 +139,11 @@ impl CpuEngine {
         self.buffers.allocated_bytes()
     }
 
+    /// See [`Engine::peak_bytes`](super::Engine::peak_bytes).
+    pub fn peak_bytes(&self) -> u64 {
+        self.buffers.peak_bytes()
+    }
+
     /// See [`Engine::max_buffer_words`](super::Engine::max_buffer_words).
     pub fn max_buffer_words(&self) -> usize {
         (MAX_BUFFER_BYTES / 4) as usize

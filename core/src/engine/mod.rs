@@ -306,6 +306,11 @@ impl Engine {
         either!(self, engine => engine.allocated_bytes())
     }
 
+    /// Most that [`Engine::allocated_bytes`] has been \[bytes\].
+    pub fn peak_bytes(&self) -> u64 {
+        either!(self, engine => engine.peak_bytes())
+    }
+
     /// Largest buffer \[words\].
     pub fn max_buffer_words(&self) -> usize {
         either!(self, engine => engine.max_buffer_words())

@@ -1,8 +1,10 @@
-//! Which part of a mesh was observed. Two protocols of the field; both meshes of a comparison
+//! Which part of a mesh was observed. Three protocols of the field; both meshes of a comparison
 //! must be culled alike.
-use super::{Mesh, parallel, rasterise, to_dvec3};
+use super::{DepthRenderer, Mesh, parallel, to_dvec3};
 use crate::{camera::Camera, pose::Pose};
 use alloc::{vec, vec::Vec};
+use core::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use glam::DVec3;
 
 /// One image that observed the scene.
 #[derive(Clone, Copy, Debug)]
@@ -40,11 +42,14 @@ pub enum CullProtocol {
         truncation_m: f64,
     },
     /// Co-SLAM's: a vertex is in a real view's frustum, and a vertex is visible in a real or virtual
-    /// view, that is, no deeper than a rendering of the mesh itself plus the tolerance \[m\] (0.03).
+    /// view, that is, less deep than a rendering of the mesh itself plus the tolerance \[m\] (0.03).
+    /// Where that shows no surface nothing is visible.
     RenderedDepth {
         /// How far behind the rendered surface a vertex may lie \[m\].
         tolerance_m: f64,
     },
+    /// NICE-SLAM's and iMAP's: a vertex is in a real view's frustum, hidden or not.
+    Frustum,
 }
 
 impl CullProtocol {
@@ -53,8 +58,28 @@ impl CullProtocol {
         match self {
             CullProtocol::SensorDepth { .. } => "culled to frustum and sensor depth (ESLAM)",
             CullProtocol::RenderedDepth { .. } => "culled to frustum and visibility (Co-SLAM)",
+            CullProtocol::Frustum => "culled to the frustum alone (NICE-SLAM)",
         }
     }
+}
+
+/// Depth along z \[m\] of a camera-frame point and the index of the pixel that it falls on, if it
+/// lies between the centres of the image's outermost pixels, as the peers want it.
+fn between_centres(camera: &Camera, p: DVec3) -> Option<(f64, usize)> {
+    let uv = camera.project(p)?;
+    let (w, h) = (f64::from(camera.width) - 1.0, f64::from(camera.height) - 1.0);
+    // Written so that NaN fails.
+    let inside = uv.x >= 0.0 && uv.y >= 0.0 && uv.x <= w && uv.y <= h;
+    inside.then(|| (p.z, (uv.y + 0.5) as usize * camera.width as usize + (uv.x + 0.5) as usize))
+}
+
+/// Whether each point is in the frustum of some pose.
+pub fn in_any_frustum(points: &[[f32; 3]], camera: &Camera, poses: &[Pose]) -> Vec<bool> {
+    let cameras: Vec<Pose> = poses.iter().map(Pose::inverse).collect();
+    parallel::map(points.len(), |i| {
+        let p = to_dvec3(points[i]);
+        cameras.iter().any(|c| between_centres(camera, c.transform_point(p)).is_some())
+    })
 }
 
 /// How many corners of a triangle must be observed for it to stay.
@@ -70,9 +95,10 @@ pub enum Keep {
 /// sequence need not be in memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Visibility {
-    /// A vertex is in a real view's frustum (`RenderedDepth`), or observed (`SensorDepth`).
+    /// A vertex is in a real view's frustum (`RenderedDepth`, `Frustum`), or observed
+    /// (`SensorDepth`).
     pub in_view: Vec<bool>,
-    /// A vertex is not hidden by the mesh in some view (`RenderedDepth`), or observed.
+    /// A vertex is visible in some view (`RenderedDepth`), in a frustum, or observed.
     pub unhidden: Vec<bool>,
 }
 
@@ -93,6 +119,9 @@ impl Visibility {
         // Two bits a vertex: in view, unhidden.
         let seen: Vec<(bool, bool)> = match protocol {
             CullProtocol::SensorDepth { truncation_m } => parallel::map(n, |i| {
+                if self.in_view[i] {
+                    return (true, true);
+                }
                 let observed = place(i).is_some_and(|(z, pixel)| {
                     let depth = view.depth.get(pixel).map_or(0.0, |&d| f64::from(d));
                     depth > 0.0 && z < depth * view.depth_unit_m + truncation_m
@@ -100,20 +129,67 @@ impl Visibility {
                 (observed, observed)
             }),
             CullProtocol::RenderedDepth { tolerance_m } => {
-                let rendered = rasterise(mesh, view.camera, &view.world_from_camera);
-                parallel::map(n, |i| match place(i) {
-                    Some((z, pixel)) => {
-                        let depth = f64::from(rendered.depth_m[pixel]);
-                        (!view.depth.is_empty(), depth == 0.0 || z < depth + tolerance_m)
-                    }
-                    None => (false, false),
-                })
+                let pose = [view.world_from_camera];
+                let real = !view.depth.is_empty();
+                let renderer = DepthRenderer::new(mesh);
+                return self.add_rendered(mesh, &renderer, view.camera, &pose, real, tolerance_m);
             }
+            CullProtocol::Frustum => parallel::map(n, |i| {
+                let p = camera_from_world.transform_point(to_dvec3(mesh.positions[i]));
+                let inside = !view.depth.is_empty() && between_centres(view.camera, p).is_some();
+                (inside, inside)
+            }),
         };
         for (i, (in_view, unhidden)) in seen.into_iter().enumerate() {
             self.in_view[i] |= in_view;
             self.unhidden[i] |= unhidden;
         }
+    }
+
+    /// Add what many views of one camera see under [`CullProtocol::RenderedDepth`], in parallel.
+    /// `renderer` is that of `mesh`; `real` views count for `in_view`, virtual ones do not.
+    pub fn add_rendered(
+        &mut self,
+        mesh: &Mesh,
+        renderer: &DepthRenderer<'_>,
+        camera: &Camera,
+        poses: &[Pose],
+        real: bool,
+        tolerance_m: f64,
+    ) {
+        // A flag is only ever set, so the order of the views does not matter.
+        let shared = |flags: &[bool]| -> Vec<AtomicBool> {
+            flags.iter().map(|&f| AtomicBool::new(f)).collect()
+        };
+        let (in_view, unhidden) = (shared(&self.in_view), shared(&self.unhidden));
+        parallel::map(poses.len(), |k| {
+            let camera_from_world = poses[k].inverse();
+            let mut depth_m = Vec::new();
+            for (i, p) in mesh.positions.iter().enumerate() {
+                let known = unhidden[i].load(Relaxed);
+                if known && (!real || in_view[i].load(Relaxed)) {
+                    continue;
+                }
+                let p = camera_from_world.transform_point(to_dvec3(*p));
+                let Some((z, pixel)) = between_centres(camera, p) else { continue };
+                if real {
+                    in_view[i].store(true, Relaxed);
+                }
+                if known {
+                    continue;
+                }
+                // Late in a sequence most views show nothing new, and need no picture.
+                if depth_m.is_empty() {
+                    depth_m = renderer.depth_m(camera, &poses[k], f64::INFINITY);
+                }
+                let depth = f64::from(depth_m[pixel]);
+                if depth > 0.0 && z < depth + tolerance_m {
+                    unhidden[i].store(true, Relaxed);
+                }
+            }
+        });
+        self.in_view = in_view.into_iter().map(AtomicBool::into_inner).collect();
+        self.unhidden = unhidden.into_iter().map(AtomicBool::into_inner).collect();
     }
 }
 
@@ -151,7 +227,6 @@ mod tests {
     use super::*;
     use crate::mesh::test_shapes::square;
     use core::f64::consts::PI;
-    use glam::DVec3;
 
     const CAMERA: Camera = Camera { width: 40, height: 40, fx: 40.0, fy: 40.0, cx: 19.5, cy: 19.5 };
 
@@ -203,5 +278,42 @@ mod tests {
         let both = observed_part(&mesh, [view(&depth), behind], protocol, Keep::AllSeen);
         assert!(both.positions.iter().any(|p| p[2] == 2.0));
         assert!(observed_part(&mesh, [behind], protocol, Keep::AnySeen).positions.is_empty());
+        // By the frustum alone the hidden wall stays, too, and needs no virtual view.
+        let frustum = observed_part(&mesh, [view(&depth)], CullProtocol::Frustum, Keep::AllSeen);
+        let far = |m: &Mesh| m.positions.iter().filter(|p| p[2] == 2.0).count();
+        assert!(far(&frustum) >= far(&both) && far(&both) > 0 && far(&part) == 0);
+        assert!(frustum.positions.iter().all(|p| p[0].abs() < 1.1));
+    }
+
+    #[test]
+    fn a_cube_seen_from_outside_loses_the_faces_behind() {
+        // One camera before a face, one virtual before another.
+        let mut cube = Mesh::default();
+        for axis in 0..3 {
+            for z in [0.0, 1.0] {
+                let face = square(20, 1.0, z);
+                let offset = cube.positions.len() as u32;
+                let turn = |p: &[f32; 3]| core::array::from_fn(|a| p[(a + axis) % 3] - 0.5);
+                cube.positions.extend(face.positions.iter().map(turn));
+                cube.triangles.extend(face.triangles.iter().map(|t| t.map(|i| i + offset)));
+            }
+        }
+        let protocol = CullProtocol::RenderedDepth { tolerance_m: 0.03 };
+        let depth = vec![1u16; 1600];
+        let mut front = view(&depth);
+        front.world_from_camera.translation = DVec3::new(0.0, 0.0, -3.0);
+        let part =
+            |views: &[View<'_>], p| observed_part(&cube, views.iter().copied(), p, Keep::AllSeen);
+        // A vertex on the silhouette may fall on a pixel that shows nothing.
+        let seen = part(&[front], protocol);
+        assert!((0.8..=1.0 + 1e-6).contains(&seen.area()), "{}", seen.area());
+        assert!(seen.positions.iter().all(|p| p[2] == -0.5));
+        assert!((part(&[front], CullProtocol::Frustum).area() - 6.0).abs() < 1e-5);
+        // From +x, looking along -x.
+        let mut side = view(&[]);
+        side.world_from_camera = Pose::from_twist(&[3.0, 0.0, 0.0, 0.0, -PI / 2.0, 0.0]);
+        let both = part(&[front, side], protocol);
+        assert!((1.6..=2.0 + 1e-6).contains(&both.area()), "{}", both.area());
+        assert!(both.positions.iter().all(|p| p[2] == -0.5 || p[0] == 0.5));
     }
 }

@@ -5,6 +5,7 @@
 //! counter-clockwise seen from the free side (where the signed distance is positive).
 mod components;
 mod cull;
+mod depth;
 mod glb;
 mod marching;
 pub(crate) mod parallel;
@@ -14,7 +15,8 @@ mod raster;
 mod tables;
 
 pub use components::{ComponentSize, components};
-pub use cull::{CullProtocol, Keep, View, Visibility, cull, observed_part};
+pub use cull::{CullProtocol, Keep, View, Visibility, cull, in_any_frustum, observed_part};
+pub use depth::DepthRenderer;
 pub use glb::{write_glb, write_glb_by_class};
 pub use marching::{Block, BlockMesher};
 pub use ply_read::{PlyError, read_ply};

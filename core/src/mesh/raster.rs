@@ -8,7 +8,7 @@ use glam::DVec3;
 use num_traits::Float as _;
 
 /// Triangles are cut at this depth \[m\].
-const NEAR_M: f64 = 0.01;
+pub(super) const NEAR_M: f64 = 0.01;
 /// Rows drawn by one task.
 const BAND_ROWS: usize = 32;
 /// Triangles set up by one task.
@@ -24,7 +24,7 @@ pub struct Raster {
 }
 
 /// A triangle in the image that covers the box of pixels from `low` to `high`.
-struct Projected {
+pub(super) struct Projected {
     /// Pixel positions and 1 / depth.
     corners: [[f32; 3]; 3],
     low: [u32; 2],
@@ -33,9 +33,17 @@ struct Projected {
 }
 
 /// A vertex in the camera's frame \[m\] and, if before the near plane, in the image.
-struct Vertex {
+pub(super) struct Vertex {
     camera: [f32; 3],
     image: Option<[f32; 3]>,
+}
+
+impl Vertex {
+    pub(super) fn new(camera: &Camera, p: DVec3) -> Vertex {
+        // Not `z < near`: a NaN must not pass.
+        let image = (p.z >= NEAR_M).then(|| to_image(camera, p));
+        Vertex { camera: p.to_array().map(|x| x as f32), image }
+    }
 }
 
 /// Pixel position and 1 / depth of a point in the camera's frame.
@@ -49,10 +57,7 @@ fn to_image(camera: &Camera, p: DVec3) -> [f32; 3] {
 pub fn rasterise(mesh: &Mesh, camera: &Camera, world_from_camera: &Pose) -> Raster {
     let camera_from_world = world_from_camera.inverse();
     let vertices: Vec<Vertex> = parallel::map(mesh.positions.len(), |i| {
-        let p = camera_from_world.transform_point(to_dvec3(mesh.positions[i]));
-        // Not `z < near`: a NaN must not pass.
-        let image = (p.z >= NEAR_M).then(|| to_image(camera, p));
-        Vertex { camera: p.to_array().map(|x| x as f32), image }
+        Vertex::new(camera, camera_from_world.transform_point(to_dvec3(mesh.positions[i])))
     });
     let chunks = mesh.triangles.len().div_ceil(CHUNK);
     let projected: Vec<Vec<Projected>> = parallel::map(chunks, |c| {
@@ -60,11 +65,7 @@ pub fn rasterise(mesh: &Mesh, camera: &Camera, world_from_camera: &Pose) -> Rast
         let end = ((c + 1) * CHUNK).min(mesh.triangles.len());
         for t in c * CHUNK..end {
             let corners = mesh.triangles[t].map(|i| &vertices[i as usize]);
-            if let [Some(a), Some(b), Some(c)] = corners.map(|v| v.image) {
-                out.extend(boxed([a, b, c], t as u32, camera));
-            } else if corners.iter().any(|v| v.image.is_some()) {
-                cut_at_near_plane(corners, t as u32, camera, &mut out);
-            }
+            project(corners, t as u32, camera, &mut |p| out.push(p));
         }
         out
     });
@@ -83,12 +84,26 @@ pub fn rasterise(mesh: &Mesh, camera: &Camera, world_from_camera: &Pose) -> Rast
     }
 }
 
+/// What of a triangle may be in the image, if anything: given to `out` as up to two triangles.
+pub(super) fn project(
+    corners: [&Vertex; 3],
+    triangle: u32,
+    camera: &Camera,
+    out: &mut impl FnMut(Projected),
+) {
+    if let [Some(a), Some(b), Some(c)] = corners.map(|v| v.image) {
+        boxed([a, b, c], triangle, camera).into_iter().for_each(out);
+    } else if corners.iter().any(|v| v.image.is_some()) {
+        cut_at_near_plane(corners, triangle, camera, out);
+    }
+}
+
 /// What is left of a triangle before the near plane, as one or two triangles.
 fn cut_at_near_plane(
     corners: [&Vertex; 3],
     triangle: u32,
     camera: &Camera,
-    out: &mut Vec<Projected>,
+    out: &mut impl FnMut(Projected),
 ) {
     let mut polygon = [DVec3::ZERO; 4];
     let mut n = 0;
@@ -105,7 +120,9 @@ fn cut_at_near_plane(
         }
     }
     let image = polygon.map(|p| to_image(camera, p));
-    out.extend((2..n).filter_map(|i| boxed([image[0], image[i - 1], image[i]], triangle, camera)));
+    (2..n)
+        .filter_map(|i| boxed([image[0], image[i - 1], image[i]], triangle, camera))
+        .for_each(out);
 }
 
 /// The box of pixel centres that a triangle may cover; `None` if there are none, as for most
@@ -127,7 +144,7 @@ fn boxed(corners: [[f32; 3]; 3], triangle: u32, camera: &Camera) -> Option<Proje
 }
 
 /// Draw into rows `first_row..` of the image.
-fn draw(p: &Projected, first_row: usize, width: usize, pixels: &mut [(f32, u32)]) {
+pub(super) fn draw(p: &Projected, first_row: usize, width: usize, pixels: &mut [(f32, u32)]) {
     let end_row = first_row + pixels.len() / width;
     let rows = (p.low[1] as usize).max(first_row)..(p.high[1] as usize + 1).min(end_row);
     if rows.is_empty() {

@@ -217,6 +217,34 @@ mod tests {
     }
 
     #[test]
+    fn triangle_distance_is_that_of_its_nearest_point() {
+        let mut rng = Pcg::new(6, 0);
+        for case in 0..300 {
+            let mut t: [[f32; 3]; 3] = core::array::from_fn(|_| point(&mut rng));
+            // Needles and points, too.
+            match case % 10 {
+                8 => t[2] = core::array::from_fn(|a| 0.3 * t[0][a] + 0.7 * t[1][a] + 1e-4),
+                9 => t[1] = t[0],
+                _ => {}
+            }
+            let p = to_dvec3(point(&mut rng)) * 3.0 - 1.0;
+            let [a, b, c] = t.map(to_dvec3);
+            // No point of a fine grid on the triangle is nearer, and one is hardly farther.
+            let n = 60;
+            let mut least = f64::MAX;
+            for i in 0..=n {
+                for j in 0..=n - i {
+                    let (v, w) = (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n));
+                    least = least.min((a + (b - a) * v + (c - a) * w - p).length());
+                }
+            }
+            let cell = ((b - a).length() + (c - a).length()) / f64::from(n);
+            let found = num_traits::Float::sqrt(t.distance_squared(p));
+            assert!(found <= least + 1e-9 && least <= found + cell, "case {case}: {found} {least}");
+        }
+    }
+
+    #[test]
     fn triangle_distance_by_region() {
         let t = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         let d = |x, y, z| t.distance_squared(DVec3::new(x, y, z));

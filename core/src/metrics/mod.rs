@@ -7,6 +7,7 @@ mod image;
 mod semantic;
 mod surface;
 mod trajectory;
+mod virtual_views;
 
 pub use boundary::{BOUNDARY_PIXELS, BoundaryMeter, BoundaryReport};
 pub use distance::distances_to_surface;
@@ -17,6 +18,9 @@ pub use surface::{
 };
 pub use trajectory::{
     Alignment, AteReport, ErrorSummary, PosePair, RpeReport, TrajectoryError, align_rigid, ate, rpe,
+};
+pub use virtual_views::{
+    DepthViews, MeshDepthReport, VIRTUAL_CAMERA, culling_views, depth_l1, depth_views,
 };
 
 /// Why images or meshes cannot be compared.
@@ -39,6 +43,17 @@ pub enum MetricsError {
         mesh: &'static str,
         /// What is wrong with it.
         found: alloc::string::String,
+    },
+    /// No virtual view can be compared.
+    #[error(
+        "virtual views: found none that counts, expected {wanted}; {rejected} poses see parts of \
+         the true surface that no frame has seen"
+    )]
+    NoViews {
+        /// Views asked for.
+        wanted: usize,
+        /// Poses that were rejected.
+        rejected: usize,
     },
     /// The alignment before a comparison failed.
     #[error("alignment of the meshes: {0}")]

@@ -362,6 +362,11 @@ impl Slam {
         self.device.as_ref().map_or(0, |d| d.engine.allocated_bytes() as usize)
     }
 
+    /// Most that [`Slam::memory_bytes`] has been, as while bounds grew \[bytes\].
+    pub fn peak_memory_bytes(&self) -> u64 {
+        self.device.as_ref().map_or(0, |d| d.engine.peak_bytes())
+    }
+
     pub(crate) fn device(&mut self) -> Result<&mut Device, SlamError> {
         self.device.as_mut().ok_or(SlamError::NoMap)
     }

@@ -5,7 +5,8 @@ use crate::{
     classes::UNLABELLED,
     config::Inference,
     device::{Batch, Guidance},
-    kernels::shared::{FLAG_ANCHORS, FLAG_DENSE},
+    frame::Frame,
+    kernels::shared::{FLAG_ANCHORS, FLAG_DENSE, FLAG_GUIDED},
     layout::RAY_OUT_FLOATS,
     mesh::{self, BlockMesher, ComponentSize, CullProtocol, Keep, Mesh, Visibility},
     pose::Pose,
@@ -38,6 +39,26 @@ impl Slam {
     /// # Errors
     /// [`SlamError::NoMap`], engine failures.
     pub async fn render(&mut self, pose: &Pose, camera: &Camera) -> Result<View, SlamError> {
+        self.render_view(pose, camera, None).await
+    }
+
+    /// Renders the map where a sensor's depth says that the surface is, as some peers evaluate;
+    /// pixels without depth as in [`Slam::render`].
+    ///
+    /// # Errors
+    /// As [`Slam::render`]; [`SlamError::Frame`] for a frame of another size.
+    pub async fn render_at_depth(&mut self, pose: &Pose, frame: &Frame) -> Result<View, SlamError> {
+        self.check(frame)?;
+        let camera = self.info.camera;
+        self.render_view(pose, &camera, Some(frame)).await
+    }
+
+    async fn render_view(
+        &mut self,
+        pose: &Pose,
+        camera: &Camera,
+        guide: Option<&Frame>,
+    ) -> Result<View, SlamError> {
         let s = self.config.sampling.clone();
         let loss = self.config.loss.clone();
         let own = self.info.camera;
@@ -45,6 +66,7 @@ impl Slam {
             Inference::Anchors => FLAG_ANCHORS,
             Inference::Head => 0,
         };
+        let guided = if guide.is_some() { FLAG_GUIDED } else { 0 };
         let device = self.device()?;
         let pixels = camera.pixels();
         let mut view = View {
@@ -62,7 +84,7 @@ impl Slam {
                 rays_per_frame: rays,
                 stratified: s.render_stratified,
                 surface: s.render_surface,
-                flags: FLAG_DENSE | inference,
+                flags: FLAG_DENSE | guided | inference,
                 loss: &loss,
                 iteration: 0,
                 first,
@@ -70,6 +92,9 @@ impl Slam {
                 guidance: Guidance::default(),
             };
             let mut r = Recording::default();
+            if let (Some(frame), 0) = (guide, first) {
+                device.upload_frame(&mut r, VIEW_SLOT, frame);
+            }
             device.upload_pose(&mut r, VIEW_SLOT, pose);
             device.upload_window(&mut r, &[(VIEW_SLOT, true)]);
             device.record_forward(&mut r, &batch);

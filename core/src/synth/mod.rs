@@ -36,6 +36,9 @@ pub enum SceneKind {
     Room,
     /// An office of 5.4 x 4.4 x 2.7 m.
     Office,
+    /// A hall of 10 x 9 x 8 m with a gallery: large enough to show what a scene costs in memory.
+    #[cfg(feature = "hall")]
+    Hall,
 }
 
 /// What to generate.
@@ -104,6 +107,8 @@ impl SyntheticSequence {
         let name = match options.scene {
             SceneKind::Room => "synthetic-room",
             SceneKind::Office => "synthetic-office",
+            #[cfg(feature = "hall")]
+            SceneKind::Hall => "synthetic-hall",
         };
         let info = SequenceInfo {
             feature_channels: 0,
@@ -123,6 +128,25 @@ impl SyntheticSequence {
         &self.options
     }
 
+    fn render(&self, index: usize, pose: &Pose, noise: bool) -> Frame {
+        let image = render::render(&self.scene, &self.info.camera, pose);
+        let depth = if noise {
+            sensor::degrade(&image, &self.info.camera, self.options.seed, index)
+        } else {
+            image.depth_m.iter().map(|&z| sensor::quantise(z)).collect()
+        };
+        Frame {
+            features: None,
+            index,
+            number: index as u64,
+            time_s: self.time_s(index),
+            color: image.color,
+            depth,
+            labels: Some(image.labels),
+            truth: Some(*pose),
+        }
+    }
+
     /// The scene's visible surfaces as triangles, with classes and colours.
     pub fn ground_truth_mesh(&self) -> SyntheticMesh {
         mesh::build(&self.scene)
@@ -139,22 +163,13 @@ impl Sequence for SyntheticSequence {
         let Some(pose) = self.truth(index) else {
             return Err(SequenceError::OutOfRange { index, frames });
         };
-        let image = render::render(&self.scene, &self.info.camera, &pose);
-        let depth = if self.options.depth_noise {
-            sensor::degrade(&image, &self.info.camera, self.options.seed, index)
-        } else {
-            image.depth_m.iter().map(|&z| sensor::quantise(z)).collect()
-        };
-        Ok(Frame {
-            features: None,
-            index,
-            number: index as u64,
-            time_s: self.time_s(index),
-            color: image.color,
-            depth,
-            labels: Some(image.labels),
-            truth: Some(pose),
-        })
+        Ok(self.render(index, &pose, self.options.depth_noise))
+    }
+
+    /// With exact depth.
+    fn view_from(&mut self, index: usize, world_from_camera: &Pose) -> Option<Frame> {
+        let buried = self.scene.buried(world_from_camera.translation.as_vec3());
+        (!buried).then(|| self.render(index, world_from_camera, false))
     }
 
     fn truth(&self, index: usize) -> Option<Pose> {

@@ -231,7 +231,14 @@ impl Scene {
     /// Build a scene; the seed changes paints, small things and the hand's shake, not the layout.
     pub fn new(kind: SceneKind, seed: u64) -> Scene {
         let mut b = Builder {
-            rng: Rng::new(seed ^ if kind == SceneKind::Office { 0x0FF1_CE00 } else { 0 }),
+            rng: Rng::new(
+                seed ^ match kind {
+                    SceneKind::Room => 0,
+                    SceneKind::Office => 0x0FF1_CE00,
+                    #[cfg(feature = "hall")]
+                    SceneKind::Hall => 0x4A11_0000,
+                },
+            ),
             primitives: Vec::new(),
             materials: Vec::new(),
             lights: Vec::new(),
@@ -241,6 +248,8 @@ impl Scene {
         let (shell, waypoints) = match kind {
             SceneKind::Room => furniture::room::build(&mut b),
             SceneKind::Office => furniture::office::build(&mut b),
+            #[cfg(feature = "hall")]
+            SceneKind::Hall => furniture::hall::build(&mut b),
         };
         let room = Room { shell };
         let path = Path::new(&waypoints, b.rng.next());

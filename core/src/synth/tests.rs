@@ -85,6 +85,37 @@ fn the_camera_moves_as_a_hand_does_and_comes_back() {
     }
 }
 
+#[cfg(feature = "hall")]
+#[test]
+fn the_hall_is_large_and_its_camera_flies_free() {
+    let mut s = tiny(SceneKind::Hall, 1, 2000);
+    let bounds = s.info().bounds.unwrap();
+    let size = bounds.max - bounds.min;
+    assert!((size - DVec3::new(10.2, 9.2, 8.2)).abs().max_element() < 1e-3, "{size}");
+    let round = s.scene.path.round();
+    assert!((1000.0..2500.0).contains(&round), "a round takes {round} frames");
+    for i in (0..round as usize).step_by(25) {
+        let frame = s.frame(i).unwrap();
+        let known: Vec<f64> =
+            (0..frame.depth.len()).map(|k| depth_m(&frame, k)).filter(|z| *z > 0.0).collect();
+        assert!(known.len() * 10 > frame.depth.len() * 8, "frame {i}: {} known", known.len());
+        let nearest = known.iter().copied().fold(f64::MAX, f64::min);
+        assert!(nearest > 0.2, "frame {i}: {nearest} m");
+    }
+    let mesh = s.ground_truth_mesh();
+    assert!(mesh.triangles.len() > 300_000);
+}
+
+#[test]
+fn views_from_other_poses_agree_with_the_frames() {
+    let mut s = tiny(SceneKind::Room, 3, 20);
+    let pose = s.truth(7).unwrap();
+    let (a, b) = (s.frame(7).unwrap(), s.view_from(7, &pose).unwrap());
+    assert_eq!((a.color, a.depth, a.labels), (b.color, b.depth, b.labels));
+    let inside_wall = Pose { translation: DVec3::new(0.0, 0.0, -0.5), ..pose };
+    assert!(s.view_from(0, &inside_wall).is_none());
+}
+
 #[test]
 fn every_view_is_in_range_and_every_class_is_seen() {
     for kind in KINDS {

@@ -1,21 +1,22 @@
 //! `mte-slam eval`: the figures again, from files alone.
 use crate::{
-    args::{ClassArgs, CullChoice, EvalArgs, SelectionArgs, SensorArgs},
+    args::{ClassArgs, CullChoice, EvalArgs, MiouProtocol, SelectionArgs},
     class_truth::ClassTruth,
-    evaluation::{self, MeshTruth, ViewScores},
+    evaluation::{self, ViewScores},
     input,
+    mesh_evaluation::{self, MeshProtocols, MeshTruth},
+    novel,
     output::{
         folder::replace_file, metrics::Metrics, pictures::unlabelled_id, trajectory::read_tum,
     },
-    pipeline::sequence_record,
+    pipeline::{restore, sequence_record},
     record::{self, RunRecord},
     screen::Screen,
 };
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use image::{ColorType, DynamicImage};
 use mte_slam_core::{
     classes::{ClassTable, UNLABELLED},
-    dataset::GivenCamera,
     frame::SequenceInfo,
     mesh::read_ply,
     metrics::PosePair,
@@ -39,24 +40,16 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
         );
     }
     let record = record::read_run(out)?.unwrap_or_default();
+    let of_run = record.selection();
     let mut selection = SelectionArgs {
         layout: args.layout.clone(),
-        frames: (record.frames > 0).then_some(record.frames),
-        stride: record.stride,
-        start: record.start,
-        scale: record.scale,
-        sensor: SensorArgs {
-            camera: record.camera.as_deref().and_then(GivenCamera::from_numbers),
-            depth_scale: record.depth_scale,
-            axes: record.axes.clone(),
-        },
         labels: args.labels.clone().unwrap_or_else(|| record.labels.clone()),
         truth_labels: args.truth_labels.clone(),
-        features: None,
         classes: ClassArgs {
             classes: args.classes.classes.clone().or(record.classes.clone()),
             unlabelled: args.classes.unlabelled.or(record.unlabelled),
         },
+        ..of_run
     };
     let mut sequence = match input::open(&args.dataset, &selection, screen) {
         // Where the run's labels have gone the rest can still be measured.
@@ -68,7 +61,13 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
         opened => opened?,
     };
     let info = sequence.info().clone();
-    let class_truth = input::open_truth(&args.dataset, &selection, &info)?;
+    let mut class_truth = input::open_truth(&args.dataset, &selection, &info)?;
+    let novel_folder = args.dataset.join(novel::FOLDER);
+    let novel = match &args.novel {
+        Some(path) => Some(path.as_path()),
+        None => Some(novel_folder.as_path())
+            .filter(|f| f.is_dir() && out.join("checkpoint.safetensors").is_file()),
+    };
     let truth_mesh = MeshTruth::find(args.mesh.as_deref(), &args.dataset)?;
     let (labels, truth_labels) = (selection.labels.clone(), class_truth.name.clone());
     let record = RunRecord { labels, truth_labels, ..record };
@@ -78,8 +77,19 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
         lost_frames: lost_frames(&out.join("timings.csv")),
         ..Metrics::default()
     };
-    evaluate_trajectory(out, sequence.as_ref(), &mut metrics)?;
+    let truth_from_estimate = evaluate_trajectory(out, sequence.as_ref(), &mut metrics)?;
     let registration = ColourRegistration { scale: record.colour_scale };
+    let sni = args.miou_protocol == MiouProtocol::Sni;
+    if sni || novel.is_some() {
+        let mut slam = restore(out, &args.engine, screen)?;
+        if sni {
+            novel::sni(&mut slam, sequence.as_mut(), &mut class_truth, &mut metrics)?;
+        }
+        if let Some(path) = novel {
+            let aligned = truth_from_estimate;
+            novel::recorded(&mut slam, path, &selection, aligned, &mut metrics, screen)?;
+        }
+    }
     evaluate_renders(out, sequence.as_mut(), class_truth, registration, screen, &mut metrics)?;
     let path = out.join("mesh.ply");
     match truth_mesh {
@@ -93,13 +103,16 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
             let name = path.display();
             let bytes = std::fs::read(&path).with_context(|| format!("{name}: cannot be read"))?;
             let mesh = read_ply(&bytes).with_context(|| format!("{name}: not a mesh"))?;
-            screen.note("comparing the mesh with the true one");
-            let protocol = args.cull.protocol();
-            match evaluation::mesh(mesh, truth, sequence.as_mut(), protocol, args.icp) {
-                Ok(report) => metrics.mesh = Some(report),
-                Err(reason) => {
-                    metrics.absent.insert("mesh", format!("{reason:#}"));
-                }
+            drop(bytes);
+            let wanted = protocols(args);
+            let sequence = sequence.as_mut();
+            let views =
+                mesh_evaluation::score(mesh, truth, sequence, &wanted, &mut metrics, screen);
+            if let Some(path) = &args.write_views {
+                let views = views.ok_or_else(|| {
+                    anyhow!("--write-views {}: the mesh was not judged in any", path.display())
+                })?;
+                replace_file(path, serde_json::to_string(&views)?.as_bytes())?;
             }
         }
     }
@@ -111,7 +124,20 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
     Ok(())
 }
 
-fn evaluate_trajectory(out: &Path, sequence: &dyn Sequence, metrics: &mut Metrics) -> Result<()> {
+/// Which figures of the mesh the flags ask for.
+fn protocols(args: &EvalArgs) -> MeshProtocols {
+    MeshProtocols {
+        eslam: args.cull.contains(&CullChoice::Eslam),
+        coslam: args.cull.contains(&CullChoice::Coslam),
+        frustum: args.cull.contains(&CullChoice::Frustum),
+        icp: args.icp,
+        depth_views: args.mesh_views,
+        seed: args.eval_seed,
+    }
+}
+
+/// Gives back what aligns the estimate with the truth; the identity where that is not known.
+fn evaluate_trajectory(out: &Path, sequence: &dyn Sequence, metrics: &mut Metrics) -> Result<Pose> {
     let path = out.join("trajectory.txt");
     let name = path.display().to_string();
     let text = std::fs::read_to_string(&path)
@@ -141,8 +167,12 @@ fn evaluate_trajectory(out: &Path, sequence: &dyn Sequence, metrics: &mut Metric
         })
         .collect()
     };
+    let mut truth_from_estimate = Pose::IDENTITY;
     match evaluation::trajectory_of_pairs(&pairs(&|_| true)) {
-        Ok(score) => metrics.trajectory = Some(score.report),
+        Ok(score) => {
+            truth_from_estimate = score.truth_from_estimate;
+            metrics.trajectory = Some(score.report);
+        }
         Err(reason) => {
             metrics.absent.insert("trajectory", reason.to_string());
         }
@@ -152,7 +182,7 @@ fn evaluate_trajectory(out: &Path, sequence: &dyn Sequence, metrics: &mut Metric
         let score = evaluation::trajectory_of_pairs(&found);
         metrics.trajectory_without_lost = score.ok().map(|s| s.report);
     }
-    Ok(())
+    Ok(truth_from_estimate)
 }
 
 fn evaluate_renders(
@@ -245,13 +275,4 @@ fn lost_frames(timings: &Path) -> Vec<usize> {
         .filter(|line| line.ends_with(",lost"))
         .filter_map(|line| line.split(',').next()?.parse().ok())
         .collect()
-}
-
-impl CullChoice {
-    fn protocol(self) -> mte_slam_core::mesh::CullProtocol {
-        match self {
-            CullChoice::Eslam => evaluation::CULL_ESLAM,
-            CullChoice::Coslam => evaluation::CULL_COSLAM,
-        }
-    }
 }

@@ -2,8 +2,8 @@
 use crate::{
     args::RunArgs,
     errors::usage,
-    evaluation::MeshTruth,
     input::{self, Prepared},
+    mesh_evaluation::MeshTruth,
     pipeline::{self, Job},
     screen::Screen,
 };

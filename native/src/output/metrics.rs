@@ -6,8 +6,8 @@ use mte_slam_core::{
     classes::{Class, ClassTable},
     device::AnchorCounts,
     metrics::{
-        AteReport, BoundaryReport, DepthReport, PsnrReport, SMALL_SHARE_PERCENT, SemanticReport,
-        SurfaceReport,
+        AteReport, BoundaryReport, DepthReport, MeshDepthReport, PsnrReport, SMALL_SHARE_PERCENT,
+        SemanticReport, SurfaceReport,
     },
 };
 use serde::Serialize;
@@ -52,12 +52,27 @@ pub struct Metrics {
     /// The labels that the map learnt from against the true labels, where those are others.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub input_labels: Option<SemanticFigures>,
+    /// Classes of one frame by SNI-SLAM's protocol, for comparison only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub semantics_sni: Option<SniFigures>,
+    /// Views from poses that the map never saw.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub novel_views: Option<NovelFigures>,
     /// What the redundancy suppressor did.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub anchors: Option<AnchorFigures>,
-    /// Mesh against the true mesh.
+    /// Mesh against the true mesh, after ESLAM's culling.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<SurfaceReport>,
+    /// The same after Co-SLAM's culling.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh_coslam: Option<SurfaceReport>,
+    /// The same after NICE-SLAM's culling.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh_frustum: Option<SurfaceReport>,
+    /// Depth L1 of the mesh by virtual views; not to be mixed with `depth`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh_depth: Option<MeshDepthReport>,
     /// Time a frame.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<TimeFigures>,
@@ -262,6 +277,36 @@ impl SemanticFigures {
     }
 }
 
+/// Classes as SNI-SLAM's script evaluates them.
+#[derive(Debug, Clone, Serialize)]
+pub struct SniFigures {
+    /// What the figures mean.
+    pub protocol: &'static str,
+    /// The frame.
+    pub frame: usize,
+    /// Mean IoU \[%\] over the classes with a non-empty union.
+    pub miou_percent: f64,
+    /// Number of classes in that mean.
+    pub miou_classes: usize,
+    /// Share of the pixels with the right class \[%\].
+    pub pixel_accuracy_percent: f64,
+}
+
+/// Views from poses that the map never saw.
+#[derive(Debug, Clone, Serialize)]
+pub struct NovelFigures {
+    /// Where the views and their truth come from.
+    pub protocol: String,
+    /// Number of views.
+    pub views: usize,
+    /// Depth.
+    pub depth: Option<DepthReport>,
+    /// Colour.
+    pub color: Option<PsnrReport>,
+    /// Classes.
+    pub semantics: Option<SemanticFigures>,
+}
+
 /// What was rendered.
 #[derive(Debug, Clone, Serialize)]
 pub struct RenderRecord {
@@ -284,6 +329,8 @@ pub struct TimeFigures {
     pub mapping: Spread,
     /// Both and what is between them.
     pub total: Spread,
+    /// The last optimisation over all keyframes, which belongs to no frame \[s\].
+    pub last_optimisation_s: f64,
     /// The whole program, with loading, evaluation and mesh; where a run was resumed, with the time
     /// until the checkpoint it was resumed from.
     pub wall_s: f64,
@@ -302,8 +349,10 @@ pub struct MemoryFigures {
     /// Why that is unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub peak_host_unknown: Option<String>,
-    /// Buffers of the engine.
+    /// Buffers of the engine at the end.
     pub device_bytes: u64,
+    /// Most they have been together.
+    pub peak_device_bytes: u64,
 }
 
 impl Metrics {
@@ -343,35 +392,56 @@ impl Metrics {
                 row(&name, value, protocol);
             }
         }
+        if let Some(s) = &self.semantics_sni {
+            let value = format!("{:.2}, {:.2} %", s.miou_percent, s.pixel_accuracy_percent);
+            row("SNI-SLAM's mIoU, pixels", value, s.protocol);
+        }
+        if let Some(n) = &self.novel_views {
+            if let Some(s) = &n.semantics {
+                row("novel views: mIoU", format!("{:.2} %", s.report.miou_percent), &n.protocol);
+                let pixels = format!("{:.2} %", s.report.pixel_accuracy_percent);
+                row("novel views: pixel accuracy", pixels, "");
+            }
+            let protocol = if n.semantics.is_none() { n.protocol.as_str() } else { "" };
+            if let Some(d) = &n.depth {
+                row("novel views: depth L1, views", format!("{:.2} cm", d.l1_cm), protocol);
+            }
+            if let Some(c) = &n.color {
+                row("novel views: PSNR", format!("{:.2} dB", c.mean_of_psnr_db), "");
+            }
+        }
         if let Some(s) = &self.input_labels {
             for (i, (name, value)) in s.rows("input labels: ").into_iter().enumerate() {
                 let protocol = "the labels that the map learnt from, in the rendered frames";
                 row(&name, value, if i == 0 { protocol } else { "" });
             }
         }
-        if let Some(m) = &self.mesh {
-            let s = &m.point_to_surface;
-            row("mesh accuracy", format!("{:.2} cm", s.accuracy_cm), &m.protocol);
-            row("mesh completion", format!("{:.2} cm", s.completion_cm), "");
-            let ratio = format!("{:.1} %", s.completion_ratio_percent);
-            row(&format!("completion ratio < {:.0} cm", m.threshold_cm), ratio, "");
-            let p = &m.point_to_point;
-            let peers = format!("{:.2}, {:.2} cm", p.accuracy_cm, p.completion_cm);
-            row("the same point to point", peers, "");
-            row("floor of point to point", format!("{:.2} cm", m.sampling_floor_cm), "");
+        for (how, report) in
+            [("Co-SLAM", &self.mesh_coslam), ("ESLAM", &self.mesh), ("frustum", &self.mesh_frustum)]
+        {
+            let Some(m) = report else { continue };
+            for (i, (name, value)) in surface_rows(m).into_iter().enumerate() {
+                row(&format!("{name} ({how})"), value, if i == 0 { &m.protocol } else { "" });
+            }
+        }
+        if let Some(d) = &self.mesh_depth {
+            row("depth L1, mesh", format!("{:.2} cm", d.l1_cm), &d.protocol);
+            let both = format!("{:.2} cm, {:.1} %", d.l1_of_both_cm, d.missing_percent);
+            row("where both are, mesh missing", both, "");
         }
         if let Some(t) = &self.time {
             let of = |s: &Spread| format!("{:.3} s (p95 {:.3})", s.median_s, s.p95_s);
             row("tracking a frame", of(&t.tracking), t.protocol);
             row("mapping a mapped frame", of(&t.mapping), "");
             row("total a frame", of(&t.total), "");
+            row("last optimisation", format!("{:.1} s", t.last_optimisation_s), "");
             row("whole program", format!("{:.1} s", t.wall_s), "");
         }
         if let Some(m) = &self.memory {
             let mib = |b: u64| format!("{:.0} MiB", b as f64 / f64::from(1 << 20));
             let host = m.peak_host_bytes.map_or("unknown".to_owned(), mib);
             row("peak host memory", host, m.protocol);
-            row("device buffers", mib(m.device_bytes), "");
+            row("peak device buffers", mib(m.peak_device_bytes), "");
         }
         row("lost frames", lost_text(&self.lost_frames), "");
         let name_width = rows.iter().map(|r| r.0.len()).max().unwrap_or(0);
@@ -421,6 +491,19 @@ fn wrapped(text: &str) -> String {
         length += word.len();
     }
     lines
+}
+
+/// Figures of a mesh, the peers' first.
+fn surface_rows(m: &SurfaceReport) -> Vec<(&'static str, String)> {
+    let (p, s) = (&m.point_to_point, &m.point_to_surface);
+    let pair = |a: f64, b: f64| format!("{a:.2}, {b:.2} cm");
+    vec![
+        ("mesh accuracy, completion", pair(p.accuracy_cm, p.completion_cm)),
+        ("completion ratio", format!("{:.1} %", p.completion_ratio_percent)),
+        ("floor by sampling alone", format!("{:.2} cm", m.sampling_floor_cm)),
+        ("exact, to the surface", pair(s.accuracy_cm, s.completion_cm)),
+        ("exact completion ratio", format!("{:.1} %", s.completion_ratio_percent)),
+    ]
 }
 
 fn depth_detail(d: &DepthReport) -> String {

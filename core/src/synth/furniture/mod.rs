@@ -1,5 +1,7 @@
 //! Furniture, each piece relative to the builder's placement: x to the right, y to the back
 //! (towards the wall), z up, the origin on the floor under the middle unless said otherwise.
+#[cfg(feature = "hall")]
+pub mod hall;
 pub mod office;
 pub mod room;
 
