@@ -65,7 +65,7 @@ fn device_with(engine: Engine, fusion: FusionConfig, channels: u32) -> Device {
         d.upload_pose(&mut r, slot, &fixture::pose(slot));
     }
     d.upload_window(&mut r, &[(2, true), (0, true), (1, true)]);
-    d.upload_class_weights(&mut r, &[1.0; 5], &[1.0, 0.5, 2.0, 1.5, 0.75]);
+    d.upload_class_weights(&mut r, &[1.0; 5], &[1.0, 0.5, 2.0, 1.5, 0.75], &[0.0; 5]);
     d.engine.submit(&r).unwrap();
     let f = d.fusion.as_ref().unwrap();
     let (tensor, layers) = (f.parameters, f.layers.clone());
