@@ -97,7 +97,7 @@ pub struct Scene {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Synthetic {
-    /// `room` or `office`.
+    /// `room`, `office` or `hall`.
     pub scene: SceneKind,
     /// Its frames.
     pub frames: usize,
@@ -134,6 +134,7 @@ impl Synthetic {
         let scene = match self.scene {
             SceneKind::Room => "room",
             SceneKind::Office => "office",
+            SceneKind::Hall => "hall",
         };
         let noise = if self.depth_noise { "-noise" } else { "" };
         format!("{scene}-{}frames-{}px-seed{}{noise}", self.frames, self.width, self.seed)
