@@ -104,7 +104,8 @@ fn a_run_has_every_figure_with_its_protocol() {
 fn the_true_mesh_against_itself_and_moved() {
     let truth = fs::read(shared().join("room/mesh.ply")).unwrap();
     with_mesh("same", &truth);
-    let arguments = ["eval", "same", "room", "--json", "--cull", "coslam,eslam,frustum"];
+    let mut arguments = vec!["eval", "same", "room", "--json", "--mesh-views", "50"];
+    arguments.extend(["--cull", "coslam,eslam,frustum"]);
     let same = json(shared(), &arguments);
     for section in ["mesh", "mesh_coslam", "mesh_frustum"] {
         assert!(number(&same, &[section, "point_to_surface", "accuracy_cm"]) < 1e-3, "{section}");

@@ -3,8 +3,8 @@ use crate::mesh::to_dvec3;
 use alloc::{vec, vec::Vec};
 use glam::DVec3;
 
-/// Shapes in a leaf, at most.
-const LEAF: usize = 4;
+/// Shapes in a leaf, at most: few, but a fine mesh has 20 million, and a node takes 32 bytes.
+const LEAF: usize = 8;
 
 /// What the hierarchy can hold.
 pub(crate) trait Shape: Copy + Send + Sync {
@@ -81,6 +81,11 @@ pub(crate) struct Bvh<S> {
 impl<S: Shape> Bvh<S> {
     /// Build over shapes with finite coordinates (others are left out).
     pub(crate) fn new(shapes: &[S]) -> Bvh<S> {
+        Bvh::of(shapes.to_vec())
+    }
+
+    /// As [`Bvh::new`], without a second copy of the shapes.
+    pub(crate) fn of(mut shapes: Vec<S>) -> Bvh<S> {
         let centre = |s: &S| {
             let (low, high) = s.bounds();
             core::array::from_fn::<f32, 3, _>(|a| low[a] * 0.5 + high[a] * 0.5)
@@ -91,13 +96,21 @@ impl<S: Shape> Bvh<S> {
             .map(|(i, s)| (centre(s), i as u32))
             .filter(|(c, _)| c.iter().all(|x| x.is_finite()))
             .collect();
-        let mut nodes = Vec::with_capacity(items.len());
+        let mut nodes = Vec::with_capacity(node_count(items.len()));
         if !items.is_empty() {
             let all = items.len();
-            build(shapes, &mut items, 0..all, &mut nodes);
+            build(&shapes, &mut items, 0..all, &mut nodes);
         }
         let indices: Vec<u32> = items.iter().map(|(_, i)| *i).collect();
-        Bvh { nodes, shapes: indices.iter().map(|&i| shapes[i as usize]).collect(), indices }
+        drop(items);
+        // Memory: a copy of the shapes would be the largest thing here.
+        let in_place = indices.len() == shapes.len();
+        if in_place {
+            permute(&mut shapes, &indices);
+        } else {
+            shapes = indices.iter().map(|&i| shapes[i as usize]).collect();
+        }
+        Bvh { nodes, shapes, indices }
     }
 
     /// The shapes, neighbours next to each other.
@@ -135,6 +148,51 @@ impl<S: Shape> Bvh<S> {
             len += 2;
         }
         (best.0 != u32::MAX).then_some(best)
+    }
+}
+
+/// Nodes that [`build`] makes of so many shapes. Halves differ by one shape at most, so each level
+/// has nodes of two sizes only.
+fn node_count(shapes: usize) -> usize {
+    if shapes == 0 {
+        return 0;
+    }
+    let mut nodes = 0;
+    // Nodes of `size` and of `size + 1` shapes on a level.
+    let (mut size, mut even, mut more) = (shapes, 1, 0);
+    loop {
+        nodes += even + more;
+        even = if size > LEAF { even } else { 0 };
+        more = if size + 1 > LEAF { more } else { 0 };
+        if even + more == 0 {
+            return nodes;
+        }
+        (even, more) = match size % 2 {
+            0 => (2 * even + more, more),
+            _ => (even, even + 2 * more),
+        };
+        size /= 2;
+    }
+}
+
+/// Put `shapes[order[i]]` at i, for all i at once.
+fn permute<S: Copy>(shapes: &mut [S], order: &[u32]) {
+    let mut done = vec![false; order.len()];
+    for start in 0..order.len() {
+        if done[start] {
+            continue;
+        }
+        let (first, mut at) = (shapes[start], start);
+        loop {
+            done[at] = true;
+            let next = order[at] as usize;
+            if next == start {
+                shapes[at] = first;
+                break;
+            }
+            shapes[at] = shapes[next];
+            at = next;
+        }
     }
 }
 
@@ -214,6 +272,22 @@ mod tests {
             assert!(by_triangle.nearest(p, all.sqrt() * 0.999).is_none());
         }
         assert!(Bvh::<[f32; 3]>::new(&[]).nearest(DVec3::ZERO, 1.0).is_none());
+    }
+
+    #[test]
+    fn as_many_nodes_as_foretold_and_shapes_in_their_order() {
+        let mut rng = Pcg::new(7, 0);
+        for n in (0..300).chain([1000, 4097]) {
+            let points: Vec<[f32; 3]> = (0..n).map(|_| point(&mut rng)).collect();
+            let bvh = Bvh::new(&points);
+            assert_eq!(bvh.nodes.len(), node_count(n), "{n} shapes");
+            for (shape, i) in bvh.shapes.iter().zip(&bvh.indices) {
+                assert_eq!(*shape, points[*i as usize]);
+            }
+            let mut all = bvh.indices.clone();
+            all.sort_unstable();
+            assert!(all.iter().enumerate().all(|(k, i)| k == *i as usize) && all.len() == n);
+        }
     }
 
     #[test]

@@ -188,8 +188,8 @@ pub fn evaluate_surface(
         threshold_m,
     );
     let sampling_floor_cm = 100.0 * mean(&distances(&again, &truth_points));
-    let accuracy = distances(estimate_points.shapes(), &Bvh::new(&triangles(truth)));
-    let completion = distances(truth_points.shapes(), &Bvh::new(&triangles(estimate)));
+    let accuracy = distances(estimate_points.shapes(), &Bvh::of(triangles(truth)));
+    let completion = distances(truth_points.shapes(), &Bvh::of(triangles(estimate)));
     Ok(SurfaceReport {
         protocol: format!(
             "mesh: {samples} area-weighted samples a mesh, ratio under {} cm",
