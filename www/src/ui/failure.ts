@@ -48,7 +48,7 @@ const TEXTS: Record<FailureKind, Text> = {
     title: "This recording cannot be read",
     help: [
       "The message names the file, what was found and what is expected.",
-      "Recordings in the layouts of Replica (NICE-SLAM or vMAP), TUM RGB-D and 7-Scenes are understood, as folders or zip files.",
+      "Recordings in the layouts of Replica (NICE-SLAM or vMAP), ScanNet (exported or .sens), TUM RGB-D, 7-Scenes and nerfstudio, and folders of images with an intrinsics.json, are understood, as folders or zip files.",
     ],
   },
   "bad-settings": { title: "These settings cannot be used", help: ["The message names the setting and what it may be."] },
