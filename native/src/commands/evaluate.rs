@@ -205,7 +205,8 @@ fn document(plan: &Plan, results: &Results, screen: Screen) -> Result<Document> 
     blocks.push(Block::Text(
         "± is the sample standard deviation over seeds; n is how many seeds a cell has where some \
          are missing. A mean over scenes is taken seed by seed, over the scenes that have the \
-         figure. Every column has one protocol; published figures stand apart, with theirs."
+         figure, as soon as all of them have a finished run. Every column has one protocol; \
+         published figures stand apart, with theirs."
             .to_owned(),
     ));
     let missing: Vec<String> = results

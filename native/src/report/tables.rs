@@ -131,8 +131,13 @@ impl Tables<'_> {
             measure.of(runs.find(|r| r.seed == seed)?)
         };
         let seeds = &self.plan.suite.seeds;
-        let scenes: Vec<&str> =
-            self.scenes().filter(|s| seeds.iter().any(|k| of(s, *k).is_some())).collect();
+        // A scene of which no run has finished yet leaves no mean: it would be over fewer scenes.
+        let counts = |scene: &&str| {
+            let part = (*scene, preset, ablation);
+            let mut runs = self.results.of(part);
+            self.results.of(part).next().is_none() || runs.any(|r| measure.of(r).is_some())
+        };
+        let scenes: Vec<&str> = self.scenes().filter(counts).collect();
         let mean = |seed: &u32| {
             let values: Option<Vec<f64>> = scenes.iter().map(|s| of(s, *seed)).collect();
             let values = values.filter(|v| !v.is_empty())?;
@@ -462,6 +467,20 @@ mod tests {
         });
         let row = &scene_tables(&made)[0].rows[0];
         assert_eq!(row[3..], ["3.50 (n = 1)", "2.50 (n = 1)"]);
+        // A scene without the figure does not count; one without any run yet leaves no mean.
+        let of_b = |run: &RunResult| run.scene == "b";
+        let without = made_up(|run| {
+            if of_b(run) {
+                run.figures.clear();
+            }
+        });
+        assert_eq!(scene_tables(&without)[0].rows[0][2..], ["1.75 ± 0.35", "-", "1.75 ± 0.35"]);
+        let unfinished = made_up(|run| {
+            if of_b(run) {
+                run.state = "missing";
+            }
+        });
+        assert_eq!(scene_tables(&unfinished)[0].rows[0][2..], ["1.75 ± 0.35", "-", "-"]);
     }
 
     #[test]
