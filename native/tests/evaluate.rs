@@ -19,7 +19,7 @@ render_every = 3
 mesh_resolution = 0.1
 checkpoint_every = 1
 set = [
-    "mapping.rays=300", "mapping.iterations=4", "mapping.first_iterations=40", "mapping.final_iterations=2",
+    "mapping.rays=300", "mapping.iterations=4", "mapping.first_iterations=80", "mapping.final_iterations=2",
     "mapping.semantic_iterations=20", "mapping.every=2", "field.surface_fine_m=0.06",
     "sampling.render_stratified=24", "sampling.render_surface=8", "mesh.min_component_triangles=1",
 ]
@@ -331,7 +331,7 @@ fn bad_suites_say_what_is_wrong() {
     bad("render_every = 3", "render_evry = 3", &["options", "`render_evry`", "`render_every`"]);
     bad("engine = \"cpu\"", "engine = \"tpu\"", &["'tpu'", "auto, gpu, cpu"]);
     bad("mapping.rays=300", "mapping.raise=4", &["room.fast.base.seed1", "`mapping.rays`"]);
-    bad("scene = \"room\"", "scene = \"hall\"", &["`hall`", "`room`"]);
+    bad("scene = \"room\"", "scene = \"barn\"", &["`barn`", "`room`"]);
     bad(
         "synthetic = { scene = \"room\", frames = 6, width = 64 }",
         "path = \"nowhere/room\"",
