@@ -19,3 +19,30 @@ const MAX_BYTES: usize = 1 << 30;
 pub fn limit_memory() {
     ALLOCATOR.set_limit(MAX_BYTES).expect("the program itself takes less");
 }
+
+/// The mutator of targets whose input is a bundle: it changes one file at a time. (A macro, since
+/// libFuzzer's part must be linked into the target alone.)
+#[macro_export]
+macro_rules! mutate_bundles {
+    () => {
+        libfuzzer_sys::fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {
+            $crate::bundle::mutate(data, size, max_size, seed, |bytes, n| {
+                let room = bytes.len();
+                libfuzzer_sys::fuzzer_mutate(bytes, n, room)
+            })
+        });
+    };
+}
+
+/// A target that reads a bundle as a recording of each of these layouts.
+#[macro_export]
+macro_rules! fuzz_recordings {
+    ($($layout:ident),+) => {
+        libfuzzer_sys::fuzz_target!(init: $crate::limit_memory(), |data: &[u8]| {
+            let bundle = $crate::bundle::Bundle::parse(data);
+            let layouts = [$(mte_slam_core::dataset::Layout::$layout),+];
+            $crate::recordings::read(Box::new(bundle.source()), &bundle, &layouts);
+        });
+        $crate::mutate_bundles!();
+    };
+}

@@ -23,6 +23,7 @@ mod screen;
 mod server;
 mod source;
 mod suite;
+mod synthetic;
 
 use args::{Cli, Command};
 use std::process::ExitCode;

@@ -20,7 +20,7 @@ use crate::{
     pose::Pose,
     sequence::{Sequence, SequenceError},
 };
-use alloc::string::ToString;
+use alloc::format;
 use scene::Scene;
 use serde::{Deserialize, Serialize};
 
@@ -39,6 +39,18 @@ pub enum SceneKind {
     /// A hall of 10 x 9 x 8 m with a gallery: large enough to show what a scene costs in memory.
     #[cfg(feature = "hall")]
     Hall,
+}
+
+impl SceneKind {
+    /// Its name, as files and command lines have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            SceneKind::Room => "room",
+            SceneKind::Office => "office",
+            #[cfg(feature = "hall")]
+            SceneKind::Hall => "hall",
+        }
+    }
 }
 
 /// What to generate.
@@ -104,15 +116,9 @@ impl SyntheticSequence {
             cy: 0.5 * (h - 1.0),
         };
         let (min, max) = scene.room.shell.bounds();
-        let name = match options.scene {
-            SceneKind::Room => "synthetic-room",
-            SceneKind::Office => "synthetic-office",
-            #[cfg(feature = "hall")]
-            SceneKind::Hall => "synthetic-hall",
-        };
         let info = SequenceInfo {
             feature_channels: 0,
-            name: name.to_string(),
+            name: format!("synthetic-{}", options.scene.name()),
             layout: "synthetic",
             camera,
             depth_unit_m: DEPTH_UNIT_M,

@@ -103,9 +103,8 @@ struct Modules {
     fusion_steps: u32,
     /// One of them \[ms\].
     fusion: Measured,
-    /// Updates of the anchors in a call.
-    anchor_updates: u32,
-    /// One update and one maintenance; a call has one maintenance \[ms\].
+    /// An update of the anchors, of which every iteration has one, and a maintenance, of which a call
+    /// has one \[ms\].
     suppressor: Measured,
     /// All of it over the call.
     ratio: f64,
@@ -156,12 +155,11 @@ pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
     describe(&mut text, "suppressor, an update and a maintenance", &modules.suppressor);
     let _ = writeln!(
         text,
-        "\na mapping call of {} iterations: {:.1} ms; {} fusion steps, {} updates of the anchors and \
-         a maintenance add {:.1} %",
+        "\na mapping call of {} iterations: {:.1} ms; {} fusion steps, the updates of the anchors \
+         and a maintenance add {:.1} %",
         modules.iterations,
         modules.call_ms,
         modules.fusion_steps,
-        modules.anchor_updates,
         100.0 * modules.ratio
     );
     let _ = writeln!(
@@ -391,21 +389,19 @@ fn measure_modules(
 ) -> Result<Modules> {
     let suppressor = measure(device, config, Kind::Suppressor, iterations, screen)?;
     let fusion = measure(device, config, Kind::Fusion, iterations, screen)?;
-    let (calls, steps) = (config.mapping.iterations, config.fusion.steps);
-    let call_ms = mapping.ms_an_iteration * f64::from(calls);
+    let (mapping_iterations, steps) = (config.mapping.iterations, config.fusion.steps);
+    let call_ms = mapping.ms_an_iteration * f64::from(mapping_iterations);
     let stage = |m: &Measured, name: &str| -> f64 {
         m.stages.iter().filter(|s| s.kernel == name).map(|s| s.ms).sum()
     };
-    let updates = calls;
     let added = fusion.ms_an_iteration * f64::from(steps)
-        + stage(&suppressor, "update_anchors") * f64::from(updates)
+        + stage(&suppressor, "update_anchors") * f64::from(mapping_iterations)
         + stage(&suppressor, "maintain_anchors");
     Ok(Modules {
-        iterations: calls,
+        iterations: mapping_iterations,
         call_ms,
         fusion_steps: steps,
         fusion,
-        anchor_updates: updates,
         suppressor,
         ratio: added / call_ms,
     })

@@ -131,11 +131,7 @@ impl Synthetic {
 
     /// A folder's name that tells all of it.
     pub fn folder_name(&self) -> String {
-        let scene = match self.scene {
-            SceneKind::Room => "room",
-            SceneKind::Office => "office",
-            SceneKind::Hall => "hall",
-        };
+        let scene = self.scene.name();
         let noise = if self.depth_noise { "-noise" } else { "" };
         format!("{scene}-{}frames-{}px-seed{}{noise}", self.frames, self.width, self.seed)
     }

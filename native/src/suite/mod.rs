@@ -1,5 +1,4 @@
 //! Suites: many runs over scenes, seeds, presets and ablations.
-pub mod data;
 pub mod file;
 pub mod guard;
 pub mod options;

@@ -1,10 +1,9 @@
 //! The runs of a suite: what each is made from, where it goes, and what is there already.
 use super::{
-    data,
     file::{Scene, Suite},
     options, run_file,
 };
-use crate::{configuration, errors::usage, output::folder::replace_file, resume};
+use crate::{configuration, errors::usage, output::folder::replace_file, resume, synthetic};
 use anyhow::{Context, Result, bail};
 use serde_json::Value as Json;
 use std::{
@@ -169,7 +168,7 @@ impl Plan {
             let folder = self.out.join("data").join(synthetic.folder_name());
             if !folder.join("mesh.ply").is_file() {
                 say(&format!("writing the built-in recording {}", folder.display()));
-                data::write(&folder, synthetic.options())?;
+                synthetic::write(&folder, synthetic.options(), 0, |_| ())?;
             }
         }
         for run in &self.runs {

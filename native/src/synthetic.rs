@@ -1,17 +1,24 @@
-//! The recordings of a suite that are built in.
-use crate::{input, output::new_folder::NewFolder};
+//! Built-in sequences as files.
+use crate::{input, novel, output::new_folder::NewFolder};
 use anyhow::{Context, Result};
 use mte_slam_core::{
     dataset::{ColorFormat, RecordingWriter, ReplicaWriter},
+    frame::SequenceInfo,
     mesh::write_ply,
     sequence::Sequence,
     synth::{SyntheticOptions, SyntheticSequence},
 };
 use std::path::Path;
 
-/// Write a built-in sequence and its mesh to a folder, in Replica's (NICE-SLAM's) layout, without
-/// any loss: a run reads the very frames.
-pub fn write(dir: &Path, options: SyntheticOptions) -> Result<()> {
+/// Write a built-in sequence, so many views from other poses, and the true mesh to a folder, in
+/// Replica's (NICE-SLAM's) layout, without any loss: a run reads the very frames that `demo` sees.
+/// `written` is told how many frames are done.
+pub fn write(
+    dir: &Path,
+    options: SyntheticOptions,
+    novel_views: usize,
+    mut written: impl FnMut(usize),
+) -> Result<SequenceInfo> {
     let target = NewFolder::prepare(dir)?;
     let mut sequence = SyntheticSequence::new(options);
     let info = sequence.info().clone();
@@ -19,10 +26,13 @@ pub fn write(dir: &Path, options: SyntheticOptions) -> Result<()> {
         ReplicaWriter::new(&info, ColorFormat::Png, |name, bytes| target.write(name, bytes));
     for index in 0..info.frames {
         writer.write(&sequence.frame(index)?)?;
+        written(index + 1);
     }
     writer.finish()?;
+    novel::write(&mut sequence, novel_views, &mut |name, bytes| target.write(name, bytes))?;
     let mesh = input::true_mesh(sequence.ground_truth_mesh()).mesh;
     let ply = write_ply(&mesh).context("the true mesh cannot be written")?;
     target.write("mesh.ply", &ply).context("mesh.ply: cannot be written")?;
-    target.publish()
+    target.publish()?;
+    Ok(info)
 }
