@@ -301,6 +301,9 @@ pub struct SuppressorConfig {
     /// distance of its class's nearest anchor beyond that of the nearest one; 0: every label is
     /// believed.
     pub doubt: f64,
+    /// Iterations that settle the anchors by the head's classes at the very end, as a share of
+    /// `mapping.semantic_iterations`; nothing but the anchors changes.
+    pub settle_share: f64,
     /// What gives a rendered pixel its class.
     pub inference: Inference,
 }
@@ -503,6 +506,7 @@ impl Default for SuppressorConfig {
             min_importance: 100.0,
             min_age: 40,
             doubt: 1.0,
+            settle_share: 0.1,
             inference: Inference::Head,
         }
     }
@@ -675,6 +679,12 @@ impl Config {
         not_negative("suppressor.weight", a.weight)?;
         not_negative("suppressor.final_weight", a.final_weight)?;
         not_negative("suppressor.doubt", a.doubt)?;
+        check(
+            (0.0..=10.0).contains(&a.settle_share),
+            "suppressor.settle_share",
+            format!("{}", a.settle_share),
+            "0 to 10",
+        )?;
         for (field, x) in [("suppressor.beta", a.beta), ("suppressor.decay", a.decay)] {
             check((0.0..=1.0).contains(&x), field, format!("{x}"), "0 to 1")?;
         }

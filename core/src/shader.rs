@@ -29,6 +29,7 @@ pub const SHARED: &[(&str, &str)] = &[
     shared!("shared/geometry.wgsl"),
     shared!("shared/geometry_gradient.wgsl"),
     shared!("shared/geometry_mlp.wgsl"),
+    shared!("shared/head.wgsl"),
     shared!("shared/params.wgsl"),
     shared!("shared/planes.wgsl"),
     shared!("shared/random.wgsl"),

@@ -5,7 +5,7 @@ mod recording;
 mod suite;
 
 use crate::resume::Invocation;
-pub use evaluation::{CullChoice, EvalArgs, MiouProtocol};
+pub use evaluation::{CullChoice, EvalArgs, InferenceChoice, MiouProtocol};
 pub use recording::{
     ClassArgs, ColorChoice, ConvertArgs, InspectArgs, SelectionArgs, SensorArgs, TargetLayout,
 };

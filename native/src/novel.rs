@@ -1,17 +1,18 @@
 //! Rendered views that are scored in other ways than at the poses of the run: views from poses that
 //! the map never saw, and SNI-SLAM's one frame.
 use crate::{
-    args::SelectionArgs,
+    args::{InferenceChoice, SelectionArgs},
     class_truth::ClassTruth,
     evaluation::ViewScores,
     input,
-    output::metrics::{Metrics, NovelFigures, SniFigures},
+    output::metrics::{InferenceFigures, Metrics, NovelFigures, SniFigures},
     pipeline::score_view,
     record::RunRecord,
     screen::Screen,
 };
 use anyhow::{Context, Result};
 use mte_slam_core::{
+    config::Inference,
     dataset::{ColorFormat, RecordingWriter, ReplicaWriter},
     frame::{Frame, SequenceInfo},
     metrics::ConfusionMatrix,
@@ -184,6 +185,55 @@ fn score(
     scores.report(0, &mut figures);
     let Metrics { depth, color, semantics, .. } = figures;
     Ok(Some(NovelFigures { protocol, views, depth, color, semantics }))
+}
+
+/// The classes of the frames `rendered`, at estimated poses, by the nearest anchors or the head.
+pub fn by_inference(
+    slam: &mut Slam,
+    choice: InferenceChoice,
+    sequence: &mut dyn Sequence,
+    truth: ClassTruth,
+    rendered: &[usize],
+    metrics: &mut Metrics,
+    screen: Screen,
+) -> Result<()> {
+    let (inference, name) = match choice {
+        InferenceChoice::Anchors => (Inference::Anchors, "anchors"),
+        InferenceChoice::Head => (Inference::Head, "head"),
+    };
+    if choice == InferenceChoice::Anchors && !slam.has_anchors() {
+        let reason = "the map has no anchors (the suppressor was off, or there were no labels)";
+        metrics.absent.insert("semantics_by_inference", reason.to_owned());
+        return Ok(());
+    }
+    slam.set_inference(inference);
+    let info = sequence.info().clone();
+    let poses: Vec<Pose> = slam.trajectory().iter().map(|e| e.world_from_camera).collect();
+    let mut scores = ViewScores::new(&info, truth, slam.colour_registration());
+    let mut progress = screen.progress("rendering again", rendered.len());
+    for (i, &index) in rendered.iter().enumerate() {
+        let pose = poses.get(index).with_context(|| {
+            format!("frame {index}: found a map of {} frames, expected more", poses.len())
+        })?;
+        let mut view = block_on(slam.render(pose, &info.camera))
+            .with_context(|| format!("rendering frame {index}"))?;
+        score_view(&mut scores, &sequence.frame(index)?, &mut view)?;
+        progress.set(i as u64 + 1, String::new);
+    }
+    progress.finish();
+    let mut figures = Metrics::default();
+    scores.report(0, &mut figures);
+    match figures.semantics {
+        Some(semantics) => {
+            let again = InferenceFigures { inference: name, semantics };
+            metrics.semantics_by_inference = Some(again);
+        }
+        None => {
+            let reason = figures.absent.remove("semantics").unwrap_or_default();
+            metrics.absent.insert("semantics_by_inference", reason);
+        }
+    }
+    Ok(())
 }
 
 /// What SNI-SLAM's script prints as mIoU: the first frame alone, rendered at its true pose with its

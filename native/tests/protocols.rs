@@ -176,6 +176,20 @@ fn the_peers_class_protocol_and_novel_views_need_the_map() {
     assert!(number(&sni, &["semantics_sni", "pixel_accuracy_percent"]) <= 100.0);
     assert_eq!(sni["novel_views"]["views"], 6, "the recording given, not the one beside");
     assert_eq!(plain["semantics"], sni["semantics"], "the full-set figure stays");
+    // Rendered again by the head the classes are those of the run; anchors say something near it.
+    let by = |inference: &str| {
+        let mut arguments = arguments.to_vec();
+        arguments.extend(["--inference", inference]);
+        let mut again = json(shared(), &arguments)["semantics_by_inference"].take();
+        let said = again.as_object_mut().unwrap().remove("inference");
+        assert_eq!(said.unwrap(), inference);
+        again
+    };
+    assert_eq!(by("head"), plain["semantics"]);
+    let accuracy = |figures: &Value| number(figures, &["pixel_accuracy_percent"]);
+    let anchors = by("anchors");
+    assert_ne!(anchors, plain["semantics"]);
+    assert!((accuracy(&anchors) - accuracy(&plain["semantics"])).abs() < 5.0, "{anchors:#}");
     // Without a checkpoint only what was asked for by name is an error.
     with_mesh("bare", &fs::read(shared().join("run/mesh.ply")).unwrap());
     let bare = json(shared(), &["eval", "bare", "room", "--json", "--mesh-views", "0"]);

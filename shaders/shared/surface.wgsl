@@ -1,6 +1,7 @@
 // Colour decoder 32-32-3, semantic decoder 32-32-16, class head 16-C. Needs binding decoders: array<vec4f>.
 // In `sw` (vec4): colour W1 0, b1 256, W2 264, b2 296; semantic W1 297, b1 553, W2 561, b2 689.
 // Loops stay loops here: these run once a ray, and unrolled they took a minute to compile on lavapipe.
+#import shared/head.wgsl
 var<workgroup> sw: array<vec4f, 693>;
 
 fn load_surface_decoders(lane: u32) {
@@ -90,22 +91,4 @@ fn semantic_output(hidden: array<vec4f, 8>) -> array<vec4f, 4> {
 #end
     }
     return o;
-}
-fn class_logit(feature: array<vec4f, 4>, c: u32) -> f32 {
-    let row = ${HEAD_VEC4}u + c * 4u;
-    let bias = ${HEAD_VEC4}u * 4u + params.classes * 16u + c;
-    return dot(decoders[row], feature[0]) + dot(decoders[row + 1u], feature[1]) + dot(decoders[row + 2u], feature[2])
-        + dot(decoders[row + 3u], feature[3]) + decoders[bias / 4u][bias % 4u];
-}
-fn likeliest_class(feature: array<vec4f, 4>) -> u32 {
-    var best = -1e30;
-    var class_id = 255u;
-    for (var c = 0u; c < params.classes; c++) {
-        let logit = class_logit(feature, c);
-        if (logit > best) {
-            best = logit;
-            class_id = c;
-        }
-    }
-    return class_id;
 }

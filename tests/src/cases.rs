@@ -1,7 +1,7 @@
 //! Inputs of every kernel, made by the twins of the kernels before it, so that a mistake of one
 //! shader does not hide or excuse another's.
 use crate::{
-    Compare, TestRandom, f32_words,
+    Compare, TestRandom, anchors, f32_words,
     fixture::{self, CLASSES, FRAMES, Options, POISON, State, words, workgroups},
     samples, tokens,
 };
@@ -258,7 +258,9 @@ pub fn cases(kernel: &str) -> Vec<Case> {
         "pose_step" => pose_steps(&usual),
         "query_points" => query_points(),
         "reduce_partials" => reduce_partials(),
-        _ => samples::cases(kernel).unwrap_or_else(|| tokens::cases(kernel)),
+        _ => samples::cases(kernel)
+            .or_else(|| anchors::cases(kernel))
+            .unwrap_or_else(|| tokens::cases(kernel)),
     }
 }
 

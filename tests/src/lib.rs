@@ -1,6 +1,7 @@
 //! Test support: engines, and the comparison of a kernel's shader with its Rust twin.
 #![forbid(unsafe_code)]
 
+pub mod anchors;
 pub mod body;
 #[cfg(target_arch = "wasm32")]
 pub mod browser;

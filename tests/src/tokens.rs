@@ -1,4 +1,4 @@
-//! Cases of the kernels on the token grid and of the anchors. Activations are random, so that every
+//! Cases of the kernels on the token grid. Activations are random, so that every
 //! column of a token's row differs, and grids have more columns than rows and no multiple of a
 //! workgroup's tokens.
 use crate::{
@@ -17,9 +17,7 @@ use mte_slam_core::{
         extract_tokens::EXTRACT_TOKENS,
         gate_backward::GATE_BACKWARD,
         gate_tokens::GATE_TOKENS,
-        maintain_anchors::{MAINTAIN_ANCHORS, MaintainAnchorsParams},
         recall_tokens::RECALL_TOKENS,
-        shared::{RAY_MASKED, Ray},
         token_layer::TOKEN_LAYER,
         token_layer_backward::TOKEN_LAYER_BACKWARD,
         token_loss::TOKEN_LOSS,
@@ -30,12 +28,8 @@ use mte_slam_core::{
             NO_RESIDUAL, PATCH_INPUTS, RAW_GEOMETRY, RAW_HISTOGRAM, RAW_MEAN, RAW_PATCH, RAW_POINT,
             REFINED_AT, SECOND_AT, SEMANTIC_AT, STATISTICS_AT, TILE, TokenParams,
         },
-        update_anchors::{UPDATE_ANCHORS, UpdateAnchorsParams},
     },
-    layout::{
-        ANCHOR_FLOATS, FEATURE, NO_ANCHOR, NO_DISTANCE, RAY_STATE_FLOATS, STATE_ANCHOR,
-        STATE_FEATURE, TARGET_FLOATS,
-    },
+    layout::TARGET_FLOATS,
     recording::workgroups_1d,
 };
 
@@ -63,7 +57,7 @@ fn usual() -> TokenParams {
     grid(13, 9)
 }
 
-fn random(floats: usize, seed: u64, size: f32) -> Vec<u32> {
+pub(crate) fn random(floats: usize, seed: u64, size: f32) -> Vec<u32> {
     let mut random = TestRandom(seed);
     f32_words((0..floats).map(|_| random.uniform(-size, size)))
 }
@@ -455,316 +449,6 @@ fn recall_tokens() -> Vec<Case> {
     vec![case]
 }
 
-/// Slots of anchors.
-const ANCHORS: u32 = 21;
-
-/// An anchor before it is words.
-#[derive(Clone, Copy)]
-struct Anchor {
-    class: u32,
-    matches: f32,
-    importance: f32,
-    variation: f32,
-    age: f32,
-}
-
-const SETTLED: Anchor =
-    Anchor { class: 0, matches: 30.0, importance: 9.0, variation: 0.01, age: 50.0 };
-
-fn anchor_words(vector: impl Iterator<Item = f32>, a: Anchor) -> Vec<u32> {
-    let mut words = f32_words(vector);
-    words.push(a.class);
-    words.extend(f32_words([a.matches, a.importance, a.variation, a.age, 0.0, 0.0, 0.0]));
-    assert_eq!(words.len(), ANCHOR_FLOATS);
-    words
-}
-
-/// Rays with labels (some unlabelled) and masks, and features spread out by `size`.
-fn labelled_rays(count: usize, classes: u32, size: f32) -> (Vec<Ray>, Vec<[f32; FEATURE]>) {
-    let mut random = TestRandom(371);
-    (0..count as u32)
-        .map(|i| {
-            let class = if random.bits().is_multiple_of(9) { 255 } else { random.bits() % classes };
-            let mask = if random.bits().is_multiple_of(7) { RAY_MASKED } else { 0 };
-            let ray = Ray {
-                depth: random.uniform(0.5, 2.0),
-                frame: 1 | 2 << 8 | mask,
-                label: class | i << 8,
-                ..Ray::default()
-            };
-            (ray, core::array::from_fn(|_| random.uniform(-size, size)))
-        })
-        .unzip()
-}
-
-/// What `decode_rays` leaves of rays and features: the nearest anchor, and the distances.
-fn matched(rays: &[Ray], features: &[[f32; FEATURE]], anchors: &[u32]) -> Vec<u32> {
-    let mut state = random(rays.len() * RAY_STATE_FLOATS, 372, 1.0);
-    for ((ray, feature), row) in
-        rays.iter().zip(features).zip(state.chunks_exact_mut(RAY_STATE_FLOATS))
-    {
-        let (mut best, mut any, mut own) = (NO_ANCHOR, NO_DISTANCE, NO_DISTANCE);
-        for (i, a) in anchors.chunks_exact(ANCHOR_FLOATS).enumerate() {
-            if a[16] == 255 {
-                continue;
-            }
-            let d: f32 = (0..FEATURE).map(|k| (feature[k] - f32::from_bits(a[k])).powi(2)).sum();
-            if d < any {
-                (best, any) = (i as u32, d);
-            }
-            if a[16] == ray.class() {
-                own = own.min(d);
-            }
-        }
-        let at = STATE_ANCHOR as usize * 4;
-        row[at..at + 4].copy_from_slice(&[best, any.to_bits(), own.to_bits(), 0]);
-        let at = STATE_FEATURE as usize * 4;
-        row[at..at + FEATURE].copy_from_slice(&f32_words(*feature));
-    }
-    state
-}
-
-fn ray_words(rays: &[Ray]) -> Vec<u32> {
-    rays.iter().flat_map(Ray::words).collect()
-}
-
-/// Vote counts of each anchor and class.
-fn votes(anchors: u32) -> Vec<u32> {
-    let mut random = TestRandom(373);
-    f32_words((0..anchors * CLASSES).map(|_| random.uniform(0.0, 2.0)))
-}
-
-fn anchor_tolerance(kernel: &Kernel) -> Vec<Compare> {
-    let one = |name| match name {
-        "anchors" => Compare::Columns { row: ANCHOR_FLOATS, bits: &[16], relative: SUMS },
-        "votes" => Compare::Columns { row: CLASSES as usize, bits: &[], relative: SUMS },
-        "ray_state" => Compare::Columns {
-            row: RAY_STATE_FLOATS,
-            bits: &[STATE_ANCHOR as usize * 4],
-            relative: SUMS,
-        },
-        _ => Compare::U32,
-    };
-    kernel.bindings.iter().map(|binding| one(binding.name)).collect()
-}
-
-fn update_anchors() -> Vec<Case> {
-    let one = |name, rays: usize, rule, beta, memory| {
-        let (rays, features) = labelled_rays(rays, CLASSES, 1.0);
-        let mut random = TestRandom(381);
-        let mut anchors = Vec::new();
-        for i in 0..ANCHORS {
-            let vector: Vec<f32> = (0..FEATURE).map(|_| random.uniform(-0.6, 0.6)).collect();
-            // Every fifth slot is free.
-            let class = if i % 5 == 4 { 255 } else { i % CLASSES };
-            let matches = random.uniform(0.0, 50.0);
-            anchors.extend(anchor_words(vector.into_iter(), Anchor { class, matches, ..SETTLED }));
-        }
-        let p = UpdateAnchorsParams {
-            rays: rays.len() as u32,
-            anchors: ANCHORS,
-            classes: CLASSES,
-            rule,
-            beta,
-            memory,
-            decay: 0.9,
-            variation_decay: 0.8,
-        };
-        let state = matched(&rays, &features, &anchors);
-        Case {
-            name,
-            kernel: &UPDATE_ANCHORS,
-            params: words(&p),
-            buffers: vec![ray_words(&rays), state, anchors, votes(ANCHORS)],
-            workgroups: [ANCHORS, 1, 1],
-            tolerance: anchor_tolerance(&UPDATE_ANCHORS),
-            overwritten: Vec::new(),
-        }
-    };
-    vec![
-        one("running mean", 300, 1, 0.05, 1000.0),
-        one("moving average", 300, 0, 0.05, 1000.0),
-        one("full memory", 300, 1, 0.05, 20.0),
-        one("few rays", 20, 0, 1.0, 1000.0),
-    ]
-}
-
-/// What a maintenance case is about: which slot holds what, and how many anchors may spawn.
-struct Maintenance {
-    name: &'static str,
-    /// Vector (a multiple of ones) and the rest, by slot; other slots are free.
-    anchors: Vec<(f32, Anchor)>,
-    slots: u32,
-    spawns: u32,
-    spawn_distance: f32,
-    /// Classes of the rays' labels.
-    labels: u32,
-}
-
-/// Cases of `maintain_anchors`, with what they must do: (alive, spawned, dropped, merged).
-pub fn maintenance() -> Vec<(Case, [u32; 4])> {
-    let (class, weak) = (|class| Anchor { class, ..SETTLED }, 0.5);
-    let unimportant = |c| Anchor { importance: weak, ..class(c) };
-    let young = |c| Anchor { age: 3.0, ..class(c) };
-    let moving = |c| Anchor { variation: 0.5, ..class(c) };
-    // Vectors differ by 0.01 * 4 in length within a group, by 4 and more between groups.
-    let plain = |name, anchors| Maintenance {
-        name,
-        anchors,
-        slots: ANCHORS,
-        spawns: 0,
-        spawn_distance: 1e9,
-        labels: CLASSES,
-    };
-    let far = vec![(9.0, class(0)), (-9.0, class(1)), (19.0, class(2))];
-    let all_classes: Vec<_> = (0..CLASSES).map(|c| (0.1 * c as f32, class(c))).collect();
-    vec![
-        // Three of class 0 go until one is left; the only one of class 1 and a young one stay.
-        (
-            plain(
-                "drop",
-                vec![
-                    (1.0, unimportant(0)),
-                    (2.0, unimportant(0)),
-                    (3.0, unimportant(0)),
-                    (4.0, unimportant(1)),
-                    (5.0, Anchor { age: 3.0, ..unimportant(2) }),
-                    (6.0, class(2)),
-                    (7.0, unimportant(2)),
-                ],
-            ),
-            [4, 0, 3, 0],
-        ),
-        // Three duplicates of class 0 and two of class 3 become one each. Not so: another class,
-        // a moving one, a young one.
-        (
-            plain(
-                "merge",
-                vec![
-                    (1.0, class(0)),
-                    (1.01, class(1)),
-                    (1.02, Anchor { matches: 90.0, ..class(0) }),
-                    (5.0, class(3)),
-                    (0.99, class(0)),
-                    (1.01, moving(0)),
-                    (1.01, young(0)),
-                    (5.01, Anchor { matches: 0.0, importance: 3.0, ..class(3) }),
-                ],
-            ),
-            [5, 0, 0, 3],
-        ),
-        // Every class's first anchor.
-        (
-            Maintenance { spawns: 7, spawn_distance: 1e6, ..plain("first anchors", vec![]) },
-            [CLASSES, CLASSES, 0, 0],
-        ),
-        // Features far from their class's anchors, as many as may.
-        (Maintenance { spawns: 6, spawn_distance: 1.0, ..plain("spawn", far) }, [9, 6, 0, 0]),
-        // Only so many slots are free.
-        (
-            Maintenance {
-                spawns: 8,
-                spawn_distance: 1.0,
-                slots: CLASSES + 2,
-                ..plain("few free slots", all_classes.clone())
-            },
-            [CLASSES + 2, 2, 0, 0],
-        ),
-        (
-            Maintenance {
-                spawns: 8,
-                spawn_distance: 1.0,
-                slots: CLASSES,
-                ..plain("full", all_classes.clone())
-            },
-            [CLASSES, 0, 0, 0],
-        ),
-        // Classes without any anchor take the places of the least important, never of a class's last.
-        (
-            Maintenance {
-                spawns: 8,
-                spawn_distance: 1.0,
-                slots: CLASSES,
-                ..plain(
-                    "evict",
-                    vec![
-                        (1.0, class(0)),
-                        (2.0, Anchor { importance: 3.0, ..class(0) }),
-                        (3.0, class(1)),
-                        (4.0, Anchor { importance: 2.0, ..class(2) }),
-                        (5.0, Anchor { importance: 4.0, ..class(1) }),
-                    ],
-                )
-            },
-            [CLASSES, 2, 2, 0],
-        ),
-        // One drops, two merge, and their slots are used again.
-        (
-            Maintenance {
-                spawns: 3,
-                spawn_distance: 1.0,
-                slots: 6,
-                ..plain(
-                    "everything",
-                    vec![
-                        (0.0, class(0)),
-                        (3.0, unimportant(0)),
-                        (0.01, class(0)),
-                        (5.0, class(1)),
-                        (5.01, class(1)),
-                        (2.0, class(2)),
-                    ],
-                )
-            },
-            [6, 3, 1, 2],
-        ),
-        // Nothing is far from its class.
-        (
-            Maintenance { spawns: 8, spawn_distance: 1e6, ..plain("close", all_classes) },
-            [CLASSES, 0, 0, 0],
-        ),
-    ]
-    .into_iter()
-    .map(|(m, counts)| (maintenance_case(&m), counts))
-    .collect()
-}
-
-fn maintenance_case(m: &Maintenance) -> Case {
-    let (rays, features) = labelled_rays(150, m.labels, 1.0);
-    let mut random = TestRandom(391);
-    let mut anchors = Vec::new();
-    for slot in 0..m.slots as usize {
-        let (at, a) = m.anchors.get(slot).copied().unwrap_or((
-            0.0,
-            Anchor { class: 255, matches: 0.0, importance: 0.0, variation: 0.0, age: 0.0 },
-        ));
-        let vector: Vec<f32> = (0..FEATURE).map(|_| at + random.uniform(-0.001, 0.001)).collect();
-        anchors.extend(anchor_words(vector.into_iter(), a));
-    }
-    let p = MaintainAnchorsParams {
-        rays: rays.len() as u32,
-        anchors: m.slots,
-        classes: CLASSES,
-        spawns: m.spawns,
-        spawn_distance: m.spawn_distance,
-        merge_distance: 0.25,
-        stable: 0.1,
-        min_importance: 1.0,
-        min_age: 40.0,
-        ..MaintainAnchorsParams::default()
-    };
-    let state = matched(&rays, &features, &anchors);
-    Case {
-        name: m.name,
-        kernel: &MAINTAIN_ANCHORS,
-        params: words(&p),
-        buffers: vec![ray_words(&rays), state, anchors, votes(m.slots), vec![0; 4]],
-        workgroups: [1, 1, 1],
-        tolerance: anchor_tolerance(&MAINTAIN_ANCHORS),
-        overwritten: Vec::new(),
-    }
-}
-
 /// All cases of a kernel; empty for a name that is not known.
 pub(crate) fn cases(kernel: &str) -> Vec<Case> {
     match kernel {
@@ -774,13 +458,11 @@ pub(crate) fn cases(kernel: &str) -> Vec<Case> {
         "extract_tokens" => extract_tokens(),
         "gate_backward" => gate_backward(),
         "gate_tokens" => vec![gate(&usual()), gate(&grid(5, 2))],
-        "maintain_anchors" => maintenance().into_iter().map(|(case, _)| case).collect(),
         "recall_tokens" => recall_tokens(),
         "token_layer" => token_layer(),
         "token_layer_backward" => token_layer_backward(),
         "token_loss" => token_loss(),
         "token_weights" => token_weights(),
-        "update_anchors" => update_anchors(),
         _ => Vec::new(),
     }
 }

@@ -15,6 +15,7 @@ use mte_slam_core::{
 };
 use mte_slam_tests::{
     Compare, Mismatch, Tolerance,
+    anchors::maintenance,
     body::{TRAJECTORY_TOLERANCE_M, check_cases, largest_gap_m, short_run},
     cases::{Case, cases, supervised, weight_layers},
     compare_outputs,
@@ -22,7 +23,6 @@ use mte_slam_tests::{
     gpu_engine, gpu_engine_with,
     recorded::Recorded,
     samples,
-    tokens::maintenance,
 };
 use pollster::block_on;
 
@@ -68,8 +68,8 @@ macro_rules! consistency {
 consistency! {
     adam align_points attend_keys attend_queries attend_tokens composite composite_backward
     decode_rays extract_tokens gate_backward gate_tokens geometry_backward geometry_forward
-    geometry_weights maintain_anchors mask_rays matrix_product pose_gradient pose_step query_points
-    recall_tokens reduce_partials sample_depths sample_features sample_logits sample_rays scatter_geometry scatter_surface token_layer
+    geometry_weights maintain_anchors mask_rays match_rivals matrix_product pose_gradient pose_step query_points
+    recall_tokens reduce_partials sample_depths sample_features sample_logits sample_rays scatter_geometry scatter_surface settle_anchors token_layer
     token_layer_backward token_loss token_weights update_anchors weight_gradient
 }
 

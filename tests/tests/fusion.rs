@@ -7,10 +7,12 @@ use mte_slam_core::{
     engine::Engine,
     frame::{FeatureMap, Frame},
     kernels::{
-        shared::{FLAG_GUIDED, FLAG_MAP},
+        shared::{FLAG_ANCHORS, FLAG_GUIDED, FLAG_MAP},
         tokens::{APPEARANCE_AT, COLOR_AT, NO_BIAS, SEMANTIC_AT},
     },
-    layout::{ANCHOR_FLOATS, GEOMETRY_FLOATS, HEAD_FLOATS, RAY_STATE_FLOATS, STATE_ANCHOR},
+    layout::{
+        ANCHOR_FLOATS, GEOMETRY_FLOATS, HEAD_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_ANCHOR,
+    },
     recording::{BufferId, Recording},
 };
 use mte_slam_tests::{
@@ -334,6 +336,56 @@ fn ray_loss(d: &mut Device, b: &Batch<'_>) -> f64 {
     let state = block_on(d.read_ray_state(rays)).unwrap();
     let column = state.iter().skip(STATE_ANCHOR as usize * 4 + 3).step_by(RAY_STATE_FLOATS);
     column.map(|x| f64::from(*x)).sum::<f64>() / f64::from(rays)
+}
+
+/// Classes of the rays of a forward pass: the head's, and those of the nearest anchors.
+fn head_and_anchors(d: &mut Device, iteration: u32) -> Vec<(u32, u32)> {
+    let mut classes = Vec::new();
+    for flags in [FLAG_GUIDED | FLAG_MAP, FLAG_GUIDED | FLAG_MAP | FLAG_ANCHORS] {
+        let mut r = Recording::new();
+        d.record_forward(&mut r, &Batch { flags, iteration, ..batch(0.0, 0.0) });
+        d.engine.submit(&r).unwrap();
+        let out = block_on(d.read_ray_out(FRAMES * RAYS_PER_FRAME)).unwrap();
+        classes.push(out.chunks_exact(RAY_OUT_FLOATS).map(|r| r[5].to_bits()).collect::<Vec<_>>());
+    }
+    classes[0].iter().copied().zip(classes[1].iter().copied()).collect()
+}
+
+/// Anchors that settle tell more and more rays the head's class, rays they have not seen as well;
+/// classes of the head without an anchor get one; and nothing but anchors changes.
+#[test]
+fn anchors_settle_by_the_heads_classes() {
+    let mut d = supervised();
+    let untouched = |d: &mut Device| {
+        [d.semantic, d.decoders, d.appearance, d.geometry].map(|t| read(d, t.values, t.floats))
+    };
+    let agreement = |classes: &[(u32, u32)]| {
+        classes.iter().filter(|(head, anchor)| head == anchor).count() as f64 / classes.len() as f64
+    };
+    let kept = untouched(&mut d);
+    let before = head_and_anchors(&mut d, 999);
+    let told = |classes: &[(u32, u32)]| {
+        let mut told: Vec<u32> = classes.iter().map(|c| c.1).collect();
+        told.sort_unstable();
+        told.dedup();
+        told
+    };
+    for i in 0..60 {
+        let b = Batch { iteration: i, ..batch(0.0, 0.0) };
+        let mut r = Recording::new();
+        d.record_forward(&mut r, &b);
+        d.record_anchor_settling(&mut r, &b, 0.3, i.is_multiple_of(20));
+        d.engine.submit(&r).unwrap();
+    }
+    let after = head_and_anchors(&mut d, 999);
+    let (first, last) = (agreement(&before), agreement(&after));
+    println!(
+        "agreement {first:.3} before, {last:.3} after; told {:?}",
+        (told(&before), told(&after))
+    );
+    assert!(first < 0.8 && last > 0.9, "{first} {last}");
+    assert!(told(&after).len() > told(&before).len());
+    assert_eq!(kept, untouched(&mut d));
 }
 
 /// Compression loss, feature loss and both: semantic planes and decoder follow their gradients,

@@ -40,6 +40,7 @@ fn small(tracker: Tracker) -> Config {
     (config.sampling.stratified, config.sampling.surface) = (12, 4);
     (config.fusion.weight, config.suppressor.weight) = (0.02, 0.01);
     (config.suppressor.start, config.suppressor.ramp) = (1, 2);
+    config.suppressor.settle_share = 1.0;
     config.mesh.min_component_triangles = 1;
     config
 }

@@ -5,13 +5,18 @@ use crate::{
     engine::{Engine, EngineError},
     kernels::{
         maintain_anchors::{MAINTAIN_ANCHORS, MaintainAnchorsParams},
+        match_rivals::{MATCH_RIVALS, MatchRivalsParams},
+        settle_anchors::{SETTLE_ANCHORS, SettleAnchorsParams},
         update_anchors::{UPDATE_ANCHORS, UpdateAnchorsParams},
     },
-    layout::ANCHOR_FLOATS,
+    layout::{ANCHOR_FLOATS, NO_DISTANCE},
     recording::{BufferId, Recording},
 };
 use alloc::{vec, vec::Vec};
 use serde::{Deserialize, Serialize};
+
+/// How sharply the settling of anchors minds rays that are mistaken, or nearly so.
+const SETTLE_SLOPE: f32 = 10.0;
 
 /// Buffers of the suppressor.
 pub struct Suppressor {
@@ -57,6 +62,11 @@ impl Suppressor {
         r.upload(s.anchors, 0, &free);
         e.submit(&r)?;
         Ok(s)
+    }
+
+    /// What gives points their classes from now on.
+    pub(crate) fn set_inference(&mut self, inference: Inference) {
+        self.config.inference = inference;
     }
 
     /// Whether classes are those of the nearest anchors.
@@ -114,6 +124,58 @@ impl Device {
             &[self.rays, self.ray_state, s.anchors, s.votes, s.counts],
             [1, 1, 1],
         );
+    }
+
+    /// Moves the anchors so that the nearest one tells the head's class of the last forward pass's
+    /// rays; nothing else changes, but that the rays count for those classes from then on. With
+    /// `fill` they stay, and classes of the head without an anchor get one.
+    pub fn record_anchor_settling(&self, r: &mut Recording, b: &Batch<'_>, rate: f64, fill: bool) {
+        let Some(s) = &self.suppressor else { return };
+        let (anchors, classes) = (s.config.anchors, self.classes);
+        let settle = |r: &mut Recording, rays| {
+            r.dispatch(
+                &SETTLE_ANCHORS,
+                &SettleAnchorsParams {
+                    rays,
+                    anchors,
+                    classes,
+                    rate: rate as f32,
+                    slope: SETTLE_SLOPE,
+                    ..SettleAnchorsParams::default()
+                },
+                &[self.rays, self.ray_state, self.decoders.values, s.anchors],
+                [anchors, 1, 1],
+            );
+        };
+        if fill {
+            settle(r, 0);
+        }
+        let rays = b.frames * b.rays_per_frame;
+        r.dispatch_1d(
+            &MATCH_RIVALS,
+            &MatchRivalsParams { rays, anchors, ..MatchRivalsParams::default() },
+            &[self.ray_out, s.anchors, self.rays, self.ray_state],
+            rays as usize,
+        );
+        if fill {
+            r.dispatch(
+                &MAINTAIN_ANCHORS,
+                &MaintainAnchorsParams {
+                    rays,
+                    anchors,
+                    classes,
+                    spawns: classes,
+                    // None but the first of a class; none goes but for it.
+                    spawn_distance: 0.5 * NO_DISTANCE,
+                    min_age: f32::MAX,
+                    ..MaintainAnchorsParams::default()
+                },
+                &[self.rays, self.ray_state, s.anchors, s.votes, s.counts],
+                [1, 1, 1],
+            );
+        } else {
+            settle(r, rays);
+        }
     }
 
     /// What the suppressor did so far; `None` without one.

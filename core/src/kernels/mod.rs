@@ -137,6 +137,8 @@ registry! {
     maintain_anchors: MAINTAIN_ANCHORS,
     /// Outliers of tracking.
     mask_rays: MASK_RAYS,
+    /// Nearest anchors of a ray's class and of another.
+    match_rivals: MATCH_RIVALS,
     /// Layers on samples.
     matrix_product: MATRIX_PRODUCT,
     /// Rays' pose gradients.
@@ -161,6 +163,8 @@ registry! {
     scatter_geometry: SCATTER_GEOMETRY,
     /// Gradients into the appearance and semantic planes.
     scatter_surface: SCATTER_SURFACE,
+    /// Anchors settle by the head's classes.
+    settle_anchors: SETTLE_ANCHORS,
     /// A layer on the token grid.
     token_layer: TOKEN_LAYER,
     /// Gradients at such a layer's inputs.

@@ -26,6 +26,19 @@ const REFINE_AFTER: usize = 4;
 const SEMANTIC_STRATIFIED: u32 = 4;
 /// Keyframes that every window holds while frames come in: the current one and the two before.
 const RECENT: usize = 3;
+/// How far anchors go at first when they settle, of the way to where their rays pull and push them.
+const SETTLE_RATE: f64 = 0.2;
+
+/// A part of the last optimisation.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Part {
+    /// The whole map.
+    All,
+    /// The semantics alone.
+    Semantics,
+    /// The anchors alone.
+    Anchors,
+}
 
 /// One call of the optimisation.
 #[derive(Clone, Copy)]
@@ -154,40 +167,111 @@ impl Slam {
     /// # Errors
     /// Engine failures.
     pub async fn finish_step(&mut self) -> Result<bool, SlamError> {
-        let m = self.config.mapping.clone();
-        let done = self.finished_iterations;
-        let semantics = if self.info.classes.is_empty() { 0 } else { m.semantic_iterations };
-        let semantic = done >= m.final_iterations;
-        let (total, before) =
-            if semantic { (semantics, m.final_iterations) } else { (m.final_iterations, 0) };
-        let left = (before + total).saturating_sub(done);
-        if self.keyframes.is_empty() || left == 0 {
-            return Ok(false);
+        let parts = self.finish_parts();
+        let mut done = self.finished_iterations;
+        let mut current = None;
+        for (part, total) in parts {
+            if done < total {
+                current = Some((part, total));
+                break;
+            }
+            done -= total;
         }
-        if done == 0 {
+        let Some((part, total)) = current.filter(|_| !self.keyframes.is_empty()) else {
+            return Ok(false);
+        };
+        if self.finished_iterations == 0 {
             self.follow_odometer();
         }
-        if semantic && left == total {
+        if part == Part::Semantics && done == 0 {
             self.refresh_targets()?;
         }
-        let all: Vec<usize> = (0..self.keyframes.len()).collect();
-        let iterations = left.min(FINISH_ITERATIONS);
-        let factor = 0.1 + 0.9 * f64::from(left) / f64::from(total);
-        let rates = Rates { planes: m.rate_planes * factor, decoders: m.rate_decoders * factor };
-        let f = &self.config.fusion;
-        let fusion_steps = if semantic {
-            steps_due(f.final_steps, total, total - left, iterations)
+        let iterations = (total - done).min(FINISH_ITERATIONS);
+        let left = f64::from(total - done) / f64::from(total);
+        if part == Part::Anchors {
+            self.settle_anchors(iterations, left).await?;
         } else {
-            f.steps * iterations / m.iterations.max(1)
-        };
-        let pass = Pass { iterations, rates, recent: 0, fusion_steps, semantic };
-        self.optimise(&all, pass).await?;
+            let (m, f) = (&self.config.mapping, &self.config.fusion);
+            let semantic = part == Part::Semantics;
+            let factor = 0.1 + 0.9 * left;
+            let rates =
+                Rates { planes: m.rate_planes * factor, decoders: m.rate_decoders * factor };
+            let fusion_steps = if semantic {
+                steps_due(f.final_steps, total, done, iterations)
+            } else {
+                f.steps * iterations / m.iterations.max(1)
+            };
+            let all: Vec<usize> = (0..self.keyframes.len()).collect();
+            let pass = Pass { iterations, rates, recent: 0, fusion_steps, semantic };
+            self.optimise(&all, pass).await?;
+        }
         self.finished_iterations += iterations;
-        let more = self.finished_iterations < m.final_iterations + semantics;
+        let more = self.finished_iterations < parts.iter().map(|(_, total)| total).sum();
         if !more {
             self.follow_odometer();
         }
         Ok(more)
+    }
+
+    /// The parts of the last optimisation, with their iterations.
+    fn finish_parts(&self) -> [(Part, u32); 3] {
+        let (m, s) = (&self.config.mapping, &self.config.suppressor);
+        let semantic = if self.info.classes.is_empty() { 0 } else { m.semantic_iterations };
+        let share = if self.has_anchors() { s.settle_share } else { 0.0 };
+        let settling = (f64::from(semantic) * share).round() as u32;
+        [(Part::All, m.final_iterations), (Part::Semantics, semantic), (Part::Anchors, settling)]
+    }
+
+    /// Lets the anchors settle by what the head says of rays over all keyframes. `left` is the share
+    /// of the part that is still to be done.
+    async fn settle_anchors(&mut self, iterations: u32, left: f64) -> Result<(), SlamError> {
+        let (m, s) = (self.config.mapping.clone(), self.config.sampling.clone());
+        let loss = self.config.loss.clone();
+        let (seed, breathe) = (self.config.seed, self.breathe);
+        let keyframes: Vec<_> =
+            self.keyframes.iter().map(|k| (k.slot, k.world_from_camera)).collect();
+        let last_frame = self.keyframes.last().map_or(0, |k| k.frame);
+        let window_size = (m.window as usize).min(WINDOW_MAX).min(keyframes.len());
+        let first_iteration = self.iteration;
+        self.iteration += iterations;
+        let device = self.device()?;
+        let mut r = Recording::default();
+        for (slot, pose) in &keyframes {
+            device.upload_pose(&mut r, *slot, pose);
+        }
+        for i in 0..iterations {
+            let iteration = first_iteration + i;
+            let all = (0..keyframes.len()).collect();
+            let chosen = draw_window(BTreeSet::new(), all, window_size, seed, iteration);
+            let window: Vec<(u32, bool)> = chosen.iter().map(|&k| (keyframes[k].0, true)).collect();
+            device.upload_window(&mut r, &window);
+            let frames = window.len() as u32;
+            let batch = Batch {
+                frames,
+                rays_per_frame: m.rays / frames,
+                stratified: SEMANTIC_STRATIFIED,
+                surface: s.surface,
+                flags: FLAG_GUIDED | FLAG_MAP,
+                loss: &loss,
+                iteration,
+                first: 0,
+                rare_share: s.semantic_rare_share,
+                guidance: Guidance::default(),
+            };
+            device.record_forward(&mut r, &batch);
+            device.record_anchor_settling(&mut r, &batch, SETTLE_RATE * left, i == 0);
+            if (i + 1) % ITERATIONS_PER_RECORDING == 0 || i + 1 == iterations {
+                device.engine.submit(&r)?;
+                r = Recording::default();
+                if let Some(breathe) = breathe {
+                    device.engine.synchronise().await?;
+                    breathe(i + 1, iterations).await;
+                }
+            }
+        }
+        let counts = device.read_anchor_counts().await?;
+        self.anchor_history.extend(counts.map(|c| (last_frame, c)));
+        Ok(())
     }
 
     /// Fused features of every keyframe by what the fusion has learned since.
@@ -309,18 +393,9 @@ impl Slam {
         let mut rays = 0;
         for i in 0..iterations {
             let iteration = first_iteration + i;
-            let mut chosen: BTreeSet<usize> = (n.saturating_sub(recent)..n).collect();
-            let mut pool: Vec<usize> =
-                near.iter().copied().filter(|k| !chosen.contains(k)).collect();
-            let mut draw = 0;
-            while chosen.len() < window_size && !pool.is_empty() {
-                let k = random_u32(seed, iteration, draw, 21) as usize % pool.len();
-                chosen.insert(pool.swap_remove(k));
-                draw += 1;
-            }
-            while chosen.len() > window_size {
-                chosen.pop_first();
-            }
+            let held: BTreeSet<usize> = (n.saturating_sub(recent)..n).collect();
+            let others = near.iter().copied().filter(|k| !held.contains(k)).collect();
+            let chosen = draw_window(held, others, window_size, seed, iteration);
             let oldest = chosen.first().copied();
             let window: Vec<(u32, bool)> = chosen
                 .iter()
@@ -397,6 +472,26 @@ impl Slam {
         self.anchor_history.extend(counts.map(|c| (last_frame, c)));
         Ok(losses)
     }
+}
+
+/// A window of at most `size` keyframes: the newest of those it must hold, and others drawn.
+fn draw_window(
+    mut window: BTreeSet<usize>,
+    mut others: Vec<usize>,
+    size: usize,
+    seed: u32,
+    iteration: u32,
+) -> BTreeSet<usize> {
+    let mut draw = 0;
+    while window.len() < size && !others.is_empty() {
+        let k = random_u32(seed, iteration, draw, 21) as usize % others.len();
+        window.insert(others.swap_remove(k));
+        draw += 1;
+    }
+    while window.len() > size {
+        window.pop_first();
+    }
+    window
 }
 
 /// Weighted mean losses of the last batch.

@@ -1,7 +1,7 @@
 //! What mapping does for semantics beside rays: class weights, fusion steps, anchors by stage.
 use super::Slam;
 use crate::{
-    config::{FusionConfig, SuppressorConfig},
+    config::{FusionConfig, Inference, SuppressorConfig},
     frame::Frame,
 };
 use alloc::vec::Vec;
@@ -55,6 +55,20 @@ impl Slam {
     /// nothing.
     pub fn labelled(&self) -> bool {
         self.class_counts.any()
+    }
+
+    /// Whether there is a redundancy suppressor.
+    pub fn has_anchors(&self) -> bool {
+        self.device.as_ref().is_some_and(|d| d.suppressor.is_some())
+    }
+
+    /// Takes the classes of views and meshes from the head, or from the nearest anchors, from now on
+    /// (where there are anchors). Its checkpoints are then those of such a run.
+    pub fn set_inference(&mut self, inference: Inference) {
+        self.config.suppressor.inference = inference;
+        if let Some(s) = self.device.as_mut().and_then(|d| d.suppressor.as_mut()) {
+            s.set_inference(inference);
+        }
     }
 
     /// Weight of the compression loss by stage: features must have settled before they are held.

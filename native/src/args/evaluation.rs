@@ -82,6 +82,10 @@ pub struct EvalArgs {
     /// How rendered classes are scored.
     #[arg(long, value_enum, default_value_t, value_name = "PROTOCOL")]
     pub miou_protocol: MiouProtocol,
+    /// Render the frames again from OUT/checkpoint.safetensors, with classes by the nearest anchor or
+    /// by the class head, and score these as well: what the run itself did not choose.
+    #[arg(long, value_name = "anchors|head")]
+    pub inference: Option<InferenceChoice>,
     /// Recording of views that the run has not seen, in the same world as DATASET: the map of
     /// OUT/checkpoint.safetensors is rendered at its poses [default: DATASET/novel, if there].
     #[arg(long, value_name = "DATASET", value_hint = ValueHint::AnyPath)]
@@ -111,6 +115,15 @@ pub enum CullChoice {
     Coslam,
     /// In a frame's frustum, hidden or not (NICE-SLAM).
     Frustum,
+}
+
+/// What gives a rendered pixel its class.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum InferenceChoice {
+    /// The nearest anchor.
+    Anchors,
+    /// The class head.
+    Head,
 }
 
 /// How rendered classes are scored.

@@ -80,7 +80,8 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
     let truth_from_estimate = evaluate_trajectory(out, sequence.as_ref(), &mut metrics)?;
     let registration = ColourRegistration { scale: record.colour_scale };
     let sni = args.miou_protocol == MiouProtocol::Sni;
-    if sni || novel.is_some() {
+    let rendered = rendered_frames(out, info.frames);
+    if sni || novel.is_some() || args.inference.is_some() {
         let mut slam = restore(out, &args.engine, screen)?;
         if sni {
             novel::sni(&mut slam, sequence.as_mut(), &mut class_truth, &mut metrics)?;
@@ -89,8 +90,15 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
             let aligned = truth_from_estimate;
             novel::recorded(&mut slam, path, &selection, aligned, &mut metrics, screen)?;
         }
+        if let Some(choice) = args.inference {
+            let truth = input::open_truth(&args.dataset, &selection, &info)?;
+            let sequence = sequence.as_mut();
+            let metrics = &mut metrics;
+            novel::by_inference(&mut slam, choice, sequence, truth, &rendered, metrics, screen)?;
+        }
     }
-    evaluate_renders(out, sequence.as_mut(), class_truth, registration, screen, &mut metrics)?;
+    let views = (registration, &rendered[..]);
+    evaluate_renders(out, sequence.as_mut(), class_truth, views, screen, &mut metrics)?;
     let path = out.join("mesh.ply");
     match truth_mesh {
         Err(reason) => {
@@ -185,19 +193,23 @@ fn evaluate_trajectory(out: &Path, sequence: &dyn Sequence, metrics: &mut Metric
     Ok(truth_from_estimate)
 }
 
+/// Frames of which a run has left pictures.
+fn rendered_frames(out: &Path, frames: usize) -> Vec<usize> {
+    let folder = out.join("renders");
+    (0..frames).filter(|i| folder.join(format!("{i:06}.color.png")).is_file()).collect()
+}
+
 fn evaluate_renders(
     out: &Path,
     sequence: &mut dyn Sequence,
     class_truth: ClassTruth,
-    registration: ColourRegistration,
+    (registration, rendered): (ColourRegistration, &[usize]),
     screen: Screen,
     metrics: &mut Metrics,
 ) -> Result<()> {
     let info = sequence.info().clone();
     let unlabelled = recorded_unlabelled_id(out).unwrap_or(unlabelled_id(&class_truth.table));
     let folder = out.join("renders");
-    let rendered: Vec<usize> =
-        (0..info.frames).filter(|i| folder.join(format!("{i:06}.color.png")).is_file()).collect();
     let mut scores = ViewScores::new(&info, class_truth, registration);
     let mut progress = screen.progress("comparing pictures", rendered.len());
     for (i, &index) in rendered.iter().enumerate() {

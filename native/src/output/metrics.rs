@@ -55,6 +55,9 @@ pub struct Metrics {
     /// Classes of one frame by SNI-SLAM's protocol, for comparison only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub semantics_sni: Option<SniFigures>,
+    /// The same frames rendered again with the classes that `eval --inference` asks for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub semantics_by_inference: Option<InferenceFigures>,
     /// Views from poses that the map never saw.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub novel_views: Option<NovelFigures>,
@@ -292,6 +295,16 @@ pub struct SniFigures {
     pub pixel_accuracy_percent: f64,
 }
 
+/// Classes that a run's frames have by another source of classes than the run's.
+#[derive(Debug, Clone, Serialize)]
+pub struct InferenceFigures {
+    /// `anchors` or `head`.
+    pub inference: &'static str,
+    /// The figures.
+    #[serde(flatten)]
+    pub semantics: SemanticFigures,
+}
+
 /// Views from poses that the map never saw.
 #[derive(Debug, Clone, Serialize)]
 pub struct NovelFigures {
@@ -395,6 +408,17 @@ impl Metrics {
         if let Some(s) = &self.semantics_sni {
             let value = format!("{:.2}, {:.2} %", s.miou_percent, s.pixel_accuracy_percent);
             row("SNI-SLAM's mIoU, pixels", value, s.protocol);
+        }
+        if let Some(s) = &self.semantics_by_inference {
+            let r = &s.semantics.report;
+            let of_true = r.miou_of_true_classes_percent;
+            row(
+                &format!("by {}: mIoU, of true classes", s.inference),
+                format!("{:.2}, {of_true:.2} %", r.miou_percent),
+                "the same frames rendered again",
+            );
+            let pixels = format!("{:.2} %", r.pixel_accuracy_percent);
+            row(&format!("by {}: pixel accuracy", s.inference), pixels, "");
         }
         if let Some(n) = &self.novel_views {
             if let Some(s) = &n.semantics {

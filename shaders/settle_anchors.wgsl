@@ -1,0 +1,77 @@
+// Anchors settle where the nearest one tells the head's class: generalised learning vector quantisation. One workgroup an anchor.
+#import shared/rays.wgsl
+
+struct Params {
+    rays: u32,
+    anchors: u32,
+    classes: u32,
+    rate: f32,
+    slope: f32,
+    spare0: u32,
+    spare1: u32,
+    spare2: u32,
+}
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read> rays: array<Ray>;
+@group(0) @binding(2) var<storage, read> ray_state: array<vec4f>;
+@group(0) @binding(3) var<storage, read> decoders: array<vec4f>;
+// Per anchor: vector (4) | class (bits, 255: free), ... | ...
+@group(0) @binding(4) var<storage, read_write> anchors: array<vec4f>;
+
+#import shared/head.wgsl
+
+var<workgroup> sums: array<array<vec4f, 64>, 4>;
+var<workgroup> weights: array<f32, 64>;
+
+@compute @workgroup_size(WORKGROUP_SIZE)
+fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let at = wid.x * ${ANCHOR_VEC4}u;
+    let alive = bitcast<u32>(anchors[at + 4u].x) != 255u;
+#for j in 0..4
+    var s${j} = vec4f(0.0);
+#end
+    var weight = 0.0;
+    if (alive) {
+        for (var ray = lane; ray < params.rays; ray += 64u) {
+            let state = ray * ${RAY_STATE_VEC4}u;
+            let matched = ray_state[state + ${STATE_ANCHOR}u];
+            let own = bitcast<u32>(matched.x);
+            let rival = bitcast<u32>(matched.y);
+            if ((own != wid.x && rival != wid.x) || own == ${NO_ANCHOR}u || rival == ${NO_ANCHOR}u || (rays[ray].frame & 0x80000000u) != 0u) {
+                continue;
+            }
+            // The own anchor comes by the rival's distance, the rival goes by the own one's: both the more, the closer to a mistake.
+            let total = max(matched.z + matched.w, 1e-12);
+            let mistaken = 1.0 / (1.0 + exp(params.slope * (matched.w - matched.z) / total));
+            let w = mistaken * select(-matched.z, matched.w, own == wid.x) / total;
+            weight += abs(w);
+#for j in 0..4
+            s${j} += w * (ray_state[state + ${STATE_FEATURE+j}u] - anchors[at + ${j}u]);
+#end
+        }
+    }
+#for j in 0..4
+    sums[${j}][lane] = s${j};
+#end
+    weights[lane] = weight;
+    workgroupBarrier();
+    for (var half = 32u; half > 0u; half /= 2u) {
+        if (lane < half) {
+#for j in 0..4
+            sums[${j}][lane] += sums[${j}][lane + half];
+#end
+            weights[lane] += weights[lane + half];
+        }
+        workgroupBarrier();
+    }
+    if (lane != 0u || !alive) {
+        return;
+    }
+    let step = select(0.0, params.rate / max(weights[0], 1e-12), weights[0] > 0.0);
+    var vector: array<vec4f, 4>;
+#for j in 0..4
+    vector[${j}] = anchors[at + ${j}u] + step * sums[${j}][0];
+    anchors[at + ${j}u] = vector[${j}];
+#end
+    anchors[at + 4u].x = bitcast<f32>(likeliest_class(vector));
+}
