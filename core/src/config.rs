@@ -251,13 +251,14 @@ pub enum AnchorRule {
     Mean,
 }
 
-/// What gives a rendered pixel its class.
+/// What gives a pixel or a vertex its class.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Inference {
     /// The class head.
     Head,
-    /// The nearest anchor.
+    /// The nearest anchor, once the last optimisation is complete and anchors have settled; before
+    /// that, and without a suppressor, the class head.
     Anchors,
 }
 

@@ -169,6 +169,7 @@ impl ViewScores {
             protocol: "at estimated poses, without depth input",
             frames: self.frames.clone(),
             unlabelled_id,
+            classes_by: None,
         });
     }
 }

@@ -201,8 +201,9 @@ pub fn by_inference(
         InferenceChoice::Anchors => (Inference::Anchors, "anchors"),
         InferenceChoice::Head => (Inference::Head, "head"),
     };
-    if choice == InferenceChoice::Anchors && !slam.has_anchors() {
-        let reason = "the map has no anchors (the suppressor was off, or there were no labels)";
+    if choice == InferenceChoice::Anchors && !slam.anchors_settled() {
+        let reason = "the map has no anchors that have settled: the suppressor was off, there were \
+                      no labels, or the run is not complete";
         metrics.absent.insert("semantics_by_inference", reason.to_owned());
         return Ok(());
     }

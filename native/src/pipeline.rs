@@ -184,6 +184,10 @@ fn work(
         novel::of_run(&mut slam, sequence, &record, &frames, aligned, &mut metrics, screen)?;
     }
     scores.report(pictures::unlabelled_id(&info.classes), &mut metrics);
+    if let Some(renders) = metrics.renders.as_mut().filter(|_| !of_map.is_empty()) {
+        let source = if slam.classes_by_anchors() { "anchors" } else { "head" };
+        renders.classes_by = Some(source.to_owned());
+    }
     write_classes(folder, &of_map, &scores, &metrics)?;
     if output.no_mesh {
         metrics.absent.insert("mesh", "--no-mesh was given".to_owned());

@@ -511,9 +511,13 @@ impl Device {
         self.query(points, 0, 1).await
     }
 
-    /// 8 floats a point: distance, class (bits), 0, 0, red, green, blue, 0.
-    pub async fn query_surface(&mut self, points: &[[f32; 4]]) -> Result<Vec<f32>, EngineError> {
-        let by_anchors = self.suppressor.as_ref().is_some_and(Suppressor::infers);
+    /// 8 floats a point: distance, class (bits; the nearest anchor's or the head's), 0, 0, red, green,
+    /// blue, 0.
+    pub async fn query_surface(
+        &mut self,
+        points: &[[f32; 4]],
+        by_anchors: bool,
+    ) -> Result<Vec<f32>, EngineError> {
         let flags = FLAG_MAP | if by_anchors { FLAG_ANCHORS } else { 0 };
         let mut values = self.query(points, flags, 8).await?;
         if self.sample_head.is_some() {

@@ -1,7 +1,7 @@
 //! Feature redundancy suppressor (paper III-B) on the device.
 use super::{Batch, Device};
 use crate::{
-    config::{AnchorRule, Inference, SuppressorConfig},
+    config::{AnchorRule, SuppressorConfig},
     engine::{Engine, EngineError},
     kernels::{
         maintain_anchors::{MAINTAIN_ANCHORS, MaintainAnchorsParams},
@@ -62,16 +62,6 @@ impl Suppressor {
         r.upload(s.anchors, 0, &free);
         e.submit(&r)?;
         Ok(s)
-    }
-
-    /// What gives points their classes from now on.
-    pub(crate) fn set_inference(&mut self, inference: Inference) {
-        self.config.inference = inference;
-    }
-
-    /// Whether classes are those of the nearest anchors.
-    pub fn infers(&self) -> bool {
-        self.config.inference == Inference::Anchors
     }
 
     /// Slots of anchors.

@@ -156,9 +156,10 @@ impl Slam {
             mesh::cull(&mut chunk.mesh, &seen, Keep::AllSeen);
             points.extend(chunk.mesh.positions.iter().map(|p| [p[0], p[1], p[2], 0.0]));
         }
+        let by_anchors = self.classes_by_anchors();
         let device = self.device()?;
         let classes = device.classes > 0;
-        let values = device.query_surface(&points).await?;
+        let values = device.query_surface(&points, by_anchors).await?;
         let mut values = values.chunks_exact(8);
         chunks.retain_mut(|chunk| {
             for v in values.by_ref().take(chunk.mesh.positions.len()) {

@@ -167,10 +167,9 @@ impl Slam {
     /// # Errors
     /// Engine failures.
     pub async fn finish_step(&mut self) -> Result<bool, SlamError> {
-        let parts = self.finish_parts();
         let mut done = self.finished_iterations;
         let mut current = None;
-        for (part, total) in parts {
+        for (part, total) in self.finish_parts() {
             if done < total {
                 current = Some((part, total));
                 break;
@@ -206,11 +205,16 @@ impl Slam {
             self.optimise(&all, pass).await?;
         }
         self.finished_iterations += iterations;
-        let more = self.finished_iterations < parts.iter().map(|(_, total)| total).sum();
+        let more = self.finished_iterations < self.finish_iterations();
         if !more {
             self.follow_odometer();
         }
         Ok(more)
+    }
+
+    /// Iterations of [`Slam::finish`].
+    pub(super) fn finish_iterations(&self) -> u32 {
+        self.finish_parts().iter().fold(0, |sum, (_, total)| sum.saturating_add(*total))
     }
 
     /// The parts of the last optimisation, with their iterations.

@@ -3,7 +3,6 @@ use super::{Slam, SlamError, VIEW_SLOT, mapping::observation_step};
 use crate::{
     camera::Camera,
     classes::UNLABELLED,
-    config::Inference,
     device::{Batch, Guidance},
     frame::Frame,
     kernels::shared::{FLAG_ANCHORS, FLAG_DENSE, FLAG_GUIDED},
@@ -62,10 +61,7 @@ impl Slam {
         let s = self.config.sampling.clone();
         let loss = self.config.loss.clone();
         let own = self.info.camera;
-        let inference = match self.config.suppressor.inference {
-            Inference::Anchors => FLAG_ANCHORS,
-            Inference::Head => 0,
-        };
+        let inference = if self.classes_by_anchors() { FLAG_ANCHORS } else { 0 };
         let guided = if guide.is_some() { FLAG_GUIDED } else { 0 };
         let device = self.device()?;
         let pixels = camera.pixels();
@@ -173,9 +169,10 @@ impl Slam {
 
         let points: Vec<[f32; 4]> =
             mesh.positions.iter().map(|p| [p[0], p[1], p[2], 0.0]).collect();
+        let by_anchors = self.classes_by_anchors();
         let device = self.device()?;
         let classes = device.classes > 0;
-        let values = device.query_surface(&points).await?;
+        let values = device.query_surface(&points, by_anchors).await?;
         for v in values.chunks_exact(8) {
             mesh.colors.push([v[4], v[5], v[6]].map(|x| (x * 255.0 + 0.5).clamp(0.0, 255.0) as u8));
             if classes {

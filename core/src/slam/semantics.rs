@@ -58,17 +58,25 @@ impl Slam {
     }
 
     /// Whether there is a redundancy suppressor.
-    pub fn has_anchors(&self) -> bool {
+    pub(super) fn has_anchors(&self) -> bool {
         self.device.as_ref().is_some_and(|d| d.suppressor.is_some())
     }
 
-    /// Takes the classes of views and meshes from the head, or from the nearest anchors, from now on
-    /// (where there are anchors). Its checkpoints are then those of such a run.
+    /// Takes the classes of views and meshes from the head, or from anchors that have settled, from
+    /// now on. Its checkpoints are then those of such a run.
     pub fn set_inference(&mut self, inference: Inference) {
         self.config.suppressor.inference = inference;
-        if let Some(s) = self.device.as_mut().and_then(|d| d.suppressor.as_mut()) {
-            s.set_inference(inference);
-        }
+    }
+
+    /// Whether the last optimisation is complete, and there are anchors: they tell classes from then
+    /// on, if so configured.
+    pub fn anchors_settled(&self) -> bool {
+        self.has_anchors() && self.finished_iterations == self.finish_iterations()
+    }
+
+    /// Whether classes of views and meshes are now those of the nearest anchors, not the head's.
+    pub fn classes_by_anchors(&self) -> bool {
+        self.config.suppressor.inference == Inference::Anchors && self.anchors_settled()
     }
 
     /// Weight of the compression loss by stage: features must have settled before they are held.

@@ -208,7 +208,9 @@ fn evaluate_renders(
     metrics: &mut Metrics,
 ) -> Result<()> {
     let info = sequence.info().clone();
-    let unlabelled = recorded_unlabelled_id(out).unwrap_or(unlabelled_id(&class_truth.table));
+    let recorded = recorded_renders(out).unwrap_or_default();
+    let unlabelled = recorded["unlabelled_id"].as_u64().and_then(|id| id.try_into().ok());
+    let unlabelled = unlabelled.unwrap_or(unlabelled_id(&class_truth.table));
     let folder = out.join("renders");
     let mut scores = ViewScores::new(&info, class_truth, registration);
     let mut progress = screen.progress("comparing pictures", rendered.len());
@@ -222,15 +224,18 @@ fn evaluate_renders(
     }
     progress.finish();
     scores.report(unlabelled, metrics);
+    if let Some(renders) = &mut metrics.renders {
+        renders.classes_by = recorded["classes_by"].as_str().map(str::to_owned);
+    }
     Ok(())
 }
 
-/// The id without meaning in the run's class pictures, by its metrics.json: the pictures alone do
-/// not tell where the map knew other classes than the true labels.
-fn recorded_unlabelled_id(out: &Path) -> Option<u16> {
+/// What the run's metrics.json says of its pictures, which alone do not tell which id has no meaning
+/// where the map knew other classes than the true labels.
+fn recorded_renders(out: &Path) -> Option<serde_json::Value> {
     let text = std::fs::read_to_string(out.join("metrics.json")).ok()?;
-    let json: serde_json::Value = serde_json::from_str(&text).ok()?;
-    json["renders"]["unlabelled_id"].as_u64()?.try_into().ok()
+    let mut json: serde_json::Value = serde_json::from_str(&text).ok()?;
+    Some(json["renders"].take())
 }
 
 /// The pictures of a frame; without a class picture all pixels are unlabelled.

@@ -329,6 +329,9 @@ pub struct RenderRecord {
     pub frames: Vec<usize>,
     /// Id in the class pictures where there is no class.
     pub unlabelled_id: u16,
+    /// What gave the pixels their classes: `anchors` or `head`; absent without classes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub classes_by: Option<String>,
 }
 
 /// Time a frame.
