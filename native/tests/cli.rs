@@ -11,7 +11,7 @@ use tempfile::TempDir;
 const FRAMES: usize = 6;
 
 /// A run small enough for a test: coarse field, few rays, few iterations.
-const TINY: [&str; 26] = [
+const TINY: [&str; 28] = [
     "--preset",
     "fast",
     "--engine",
@@ -24,6 +24,8 @@ const TINY: [&str; 26] = [
     "mapping.first_iterations=60",
     "--set",
     "mapping.final_iterations=2",
+    "--set",
+    "mapping.semantic_iterations=40",
     "--set",
     "mapping.every=2",
     "--set",

@@ -9,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-const RUN: [&str; 23] = [
+const RUN: [&str; 25] = [
     "run",
     "room",
     "-q",
@@ -25,6 +25,8 @@ const RUN: [&str; 23] = [
     "mapping.first_iterations=60",
     "--set",
     "mapping.final_iterations=40",
+    "--set",
+    "mapping.semantic_iterations=200",
     "--set",
     "mapping.every=2",
     "--set",
