@@ -272,6 +272,10 @@ pub struct OutputArgs {
     /// Do not extract a mesh.
     #[arg(long, help_heading = "Output")]
     pub no_mesh: bool,
+    /// Virtual views of depth L1 of the mesh, where there is a true one; 0 leaves it out. They take
+    /// most of the time of a small run's figures.
+    #[arg(long, value_name = "N", default_value_t = 1000, help_heading = "Output")]
+    pub mesh_views: usize,
     /// Save the run after every N-th frame, and likewise in the last optimisation, so that
     /// --resume can go on from there; 0 never does.
     #[arg(long, value_name = "N", default_value_t = 100, help_heading = "Interrupted runs")]

@@ -197,7 +197,9 @@ fn work(
         meshes::write(&mesh, &of_map, &mut |name, bytes| folder.write(name, bytes))?;
         match job.truth_mesh {
             Ok(truth) => {
-                let (wanted, sequence) = (MeshProtocols::default(), sequence.as_mut());
+                let depth_views = output.mesh_views;
+                let wanted = MeshProtocols { depth_views, ..MeshProtocols::default() };
+                let sequence = sequence.as_mut();
                 mesh_evaluation::score(mesh, truth, sequence, &wanted, &mut metrics, screen);
             }
             Err(reason) => {

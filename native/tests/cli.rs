@@ -11,7 +11,7 @@ use tempfile::TempDir;
 const FRAMES: usize = 6;
 
 /// A run small enough for a test: coarse field, few rays, few iterations.
-const TINY: [&str; 28] = [
+const TINY: [&str; 30] = [
     "--preset",
     "fast",
     "--engine",
@@ -38,6 +38,8 @@ const TINY: [&str; 28] = [
     "mesh.min_component_triangles=1",
     "--mesh-resolution",
     "0.1",
+    "--mesh-views",
+    "20",
     "--render-every",
     "4",
 ];

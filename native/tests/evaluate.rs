@@ -17,6 +17,7 @@ presets = ["fast"]
 engine = "cpu"
 render_every = 3
 mesh_resolution = 0.1
+mesh_views = 20
 checkpoint_every = 1
 set = [
     "mapping.rays=300", "mapping.iterations=4", "mapping.first_iterations=80", "mapping.final_iterations=2",

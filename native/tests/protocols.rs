@@ -38,7 +38,8 @@ fn shared() -> &'static Path {
             let at = folder.path();
             succeed(at, &["synth", "room", "--frames", "6", "--width", "64", "--novel", "3"]);
             let mut run = vec!["run", "room", "--out", "run", "--preset", "fast", "-q"];
-            run.extend(["--engine", "cpu", "--mesh-resolution", "0.1", "--render-every", "4"]);
+            run.extend(["--engine", "cpu", "--mesh-resolution", "0.1", "--mesh-views", "20"]);
+            run.extend(["--render-every", "4"]);
             for set in [
                 "mapping.rays=400",
                 "mapping.iterations=4",

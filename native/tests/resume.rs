@@ -9,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-const RUN: [&str; 25] = [
+const RUN: [&str; 27] = [
     "run",
     "room",
     "-q",
@@ -33,6 +33,8 @@ const RUN: [&str; 25] = [
     "mesh.min_component_triangles=1",
     "--mesh-resolution",
     "0.1",
+    "--mesh-views",
+    "20",
     "--render-every",
     "5",
 ];

@@ -31,7 +31,7 @@ for (const tracker of ["align", "render"])
     assert.equal(spawnSync(BIN, ["synth", recording, "--frames", String(FRAMES), "--width", "80"]).status, 0);
     const out = join(world.scratch, `native-${tracker}`);
     const set = Object.entries(SETTINGS).flatMap(([key, value]) => ["--set", `${key}=${value}`]);
-    const run = spawnSync(BIN, ["run", recording, "--out", out, "--preset", "fast", "--engine", "cpu", "--tracker", tracker, ...set], { encoding: "utf8" });
+    const run = spawnSync(BIN, ["run", recording, "--out", out, "--preset", "fast", "--engine", "cpu", "--tracker", tracker, "--no-mesh", "--render-every", "0", ...set], { encoding: "utf8" });
     assert.equal(run.status, 0, run.stderr);
     const native = rows(readFileSync(join(out, "trajectory.txt"), "utf8"));
 
