@@ -222,7 +222,7 @@ impl Slam {
         let (m, s) = (&self.config.mapping, &self.config.suppressor);
         let semantic = if self.info.classes.is_empty() { 0 } else { m.semantic_iterations };
         let share = if self.has_anchors() { s.settle_share } else { 0.0 };
-        let settling = (f64::from(semantic) * share).round() as u32;
+        let settling = (f64::from(semantic) * share + 0.5) as u32;
         [(Part::All, m.final_iterations), (Part::Semantics, semantic), (Part::Anchors, settling)]
     }
 
