@@ -1,6 +1,6 @@
 //! Adding a frame to the map: bounds, keyframes, windows, optimisation, corrected poses.
 use super::semantics::steps_due;
-use super::{Losses, Observation, Slam, SlamError};
+use super::{Breathe, Losses, Observation, Slam, SlamError};
 use crate::{
     config::{RefinePoses, Tracker},
     device::{Batch, Device, Guidance, Rates, WINDOW_MAX},
@@ -264,14 +264,7 @@ impl Slam {
             };
             device.record_forward(&mut r, &batch);
             device.record_anchor_settling(&mut r, &batch, SETTLE_RATE * left, i == 0);
-            if (i + 1) % ITERATIONS_PER_RECORDING == 0 || i + 1 == iterations {
-                device.engine.submit(&r)?;
-                r = Recording::default();
-                if let Some(breathe) = breathe {
-                    device.engine.synchronise().await?;
-                    breathe(i + 1, iterations).await;
-                }
-            }
+            submit_when_due(device, &mut r, i + 1, iterations, breathe).await?;
         }
         let counts = device.read_anchor_counts().await?;
         self.anchor_history.extend(counts.map(|c| (last_frame, c)));
@@ -448,14 +441,7 @@ impl Slam {
                 }
                 device.record_step(&mut r, &batch, rates);
             }
-            if (i + 1) % ITERATIONS_PER_RECORDING == 0 || i + 1 == iterations {
-                device.engine.submit(&r)?;
-                r = Recording::default();
-                if let Some(breathe) = breathe {
-                    device.engine.synchronise().await?;
-                    breathe(i + 1, iterations).await;
-                }
-            }
+            submit_when_due(device, &mut r, i + 1, iterations, breathe).await?;
         }
         let losses = read_losses(device, rays, &loss).await?;
         if device.read_status().await? & crate::kernels::adam::STATUS_NOT_FINITE != 0 {
@@ -476,6 +462,25 @@ impl Slam {
         self.anchor_history.extend(counts.map(|c| (last_frame, c)));
         Ok(losses)
     }
+}
+
+/// Submits what is recorded once it is enough, or all there is, and starts anew.
+async fn submit_when_due(
+    device: &mut Device,
+    r: &mut Recording,
+    done: u32,
+    iterations: u32,
+    breathe: Option<Breathe>,
+) -> Result<(), SlamError> {
+    if !done.is_multiple_of(ITERATIONS_PER_RECORDING) && done != iterations {
+        return Ok(());
+    }
+    device.engine.submit(&core::mem::take(r))?;
+    if let Some(breathe) = breathe {
+        device.engine.synchronise().await?;
+        breathe(done, iterations).await;
+    }
+    Ok(())
 }
 
 /// A window of at most `size` keyframes: the newest of those it must hold, and others drawn.
