@@ -19,17 +19,13 @@ struct Params {
 @group(0) @binding(4) var<storage, read_write> anchors: array<vec4f>;
 
 #import shared/head.wgsl
-
-var<workgroup> sums: array<array<vec4f, 64>, 4>;
-var<workgroup> weights: array<f32, 64>;
+#import shared/lane_sums.wgsl
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let at = wid.x * ${ANCHOR_VEC4}u;
     let alive = bitcast<u32>(anchors[at + 4u].x) != 255u;
-#for j in 0..4
-    var s${j} = vec4f(0.0);
-#end
+    var sum: array<vec4f, 4>;
     var weight = 0.0;
     if (alive) {
         for (var ray = lane; ray < params.rays; ray += 64u) {
@@ -46,31 +42,18 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(local_invocation_index) 
             let w = mistaken * select(-matched.z, matched.w, own == wid.x) / total;
             weight += abs(w);
 #for j in 0..4
-            s${j} += w * (ray_state[state + ${STATE_FEATURE+j}u] - anchors[at + ${j}u]);
+            sum[${j}] += w * (ray_state[state + ${STATE_FEATURE+j}u] - anchors[at + ${j}u]);
 #end
         }
     }
-#for j in 0..4
-    sums[${j}][lane] = s${j};
-#end
-    weights[lane] = weight;
-    workgroupBarrier();
-    for (var half = 32u; half > 0u; half /= 2u) {
-        if (lane < half) {
-#for j in 0..4
-            sums[${j}][lane] += sums[${j}][lane + half];
-#end
-            weights[lane] += weights[lane + half];
-        }
-        workgroupBarrier();
-    }
+    sum_lanes(lane, sum, weight);
     if (lane != 0u || !alive) {
         return;
     }
-    let step = select(0.0, params.rate / max(weights[0], 1e-12), weights[0] > 0.0);
+    let step = select(0.0, params.rate / max(lane_weights[0], 1e-12), lane_weights[0] > 0.0);
     var vector: array<vec4f, 4>;
 #for j in 0..4
-    vector[${j}] = anchors[at + ${j}u] + step * sums[${j}][0];
+    vector[${j}] = anchors[at + ${j}u] + step * lane_features[${j}][0];
     anchors[at + ${j}u] = vector[${j}];
 #end
     anchors[at + 4u].x = bitcast<f32>(likeliest_class(vector));

@@ -1,41 +1,42 @@
-// Adds a layer's contribution to the gradients at its inputs. One invocation a (token, input).
+// Adds layers' contributions to the gradients at their inputs, of which no two share any. One invocation a (token, input).
 #import shared/dispatch.wgsl
 #import shared/tokens.wgsl
+#import shared/token_layers.wgsl
 
-@group(0) @binding(1) var<storage, read> parameters: array<f32>;
-@group(0) @binding(2) var<storage, read> tokens: array<f32>;
-@group(0) @binding(3) var<storage, read_write> token_gradient: array<f32>;
+@group(0) @binding(2) var<storage, read> parameters: array<f32>;
+@group(0) @binding(3) var<storage, read> tokens: array<f32>;
+@group(0) @binding(4) var<storage, read_write> token_gradient: array<f32>;
 
 // Gradient before the rectifier.
 fn delta(at: u32) -> f32 {
-    return token_gradient[at] * select(1.0, SLOPE, params.activation == 1u && tokens[at] < 0.0);
+    return token_gradient[at] * select(1.0, SLOPE, layer.activation == 1u && tokens[at] < 0.0);
 }
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let job = linear_invocation(wid, groups, lane);
-    let token = job / params.inputs;
-    let i = job % params.inputs;
+    let job = start_layer(wid, groups, lane);
+    let token = job / layer.inputs;
+    let i = job % layer.inputs;
     if (token >= params.columns * params.rows) {
         return;
     }
     var sum = 0.0;
-    for (var tap = 0u; tap < params.taps * params.taps; tap++) {
+    for (var tap = 0u; tap < layer.taps * layer.taps; tap++) {
         // The token whose tap this one is.
-        let reach = i32(params.taps / 2u);
-        let to = neighbour(token, reach - i32(tap % params.taps), reach - i32(tap / params.taps));
+        let reach = i32(layer.taps / 2u);
+        let to = neighbour(token, reach - i32(tap % layer.taps), reach - i32(tap / layer.taps));
         if (to == NONE) {
             continue;
         }
-        let at = to * params.stride + params.output;
-        if (params.depthwise == 1u) {
-            sum += delta(at + i) * parameters[params.weights + tap * params.inputs + i];
+        let at = to * params.stride + layer.output;
+        if (layer.depthwise == 1u) {
+            sum += delta(at + i) * parameters[layer.weights + tap * layer.inputs + i];
             continue;
         }
-        let w = params.weights + (tap * params.inputs + i) * params.outputs;
-        for (var o = 0u; o < params.outputs; o++) {
+        let w = layer.weights + (tap * layer.inputs + i) * layer.outputs;
+        for (var o = 0u; o < layer.outputs; o++) {
             sum += delta(at + o) * parameters[w + o];
         }
     }
-    token_gradient[token * params.stride + params.input + i] += sum;
+    token_gradient[token * params.stride + layer.input + i] += sum;
 }

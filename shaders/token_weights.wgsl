@@ -1,27 +1,28 @@
-// Gradients of a layer's weights and biases: sums over a chunk of tokens of input * delta; reduce_partials adds the chunks.
+// Gradients of layers' weights and biases: sums over a chunk of tokens of input * delta; reduce_partials adds the chunks.
 // One invocation a (chunk, tap and input, 4 outputs), or a (chunk, 4 biases).
 #import shared/dispatch.wgsl
 #import shared/tokens.wgsl
+#import shared/token_layers.wgsl
 
-@group(0) @binding(1) var<storage, read> raw: array<f32>;
-@group(0) @binding(2) var<storage, read> tokens: array<f32>;
-@group(0) @binding(3) var<storage, read_write> token_gradient: array<f32>;
-@group(0) @binding(4) var<storage, read_write> partials: array<f32>;
+@group(0) @binding(2) var<storage, read> raw: array<f32>;
+@group(0) @binding(3) var<storage, read> tokens: array<f32>;
+@group(0) @binding(4) var<storage, read_write> token_gradient: array<f32>;
+@group(0) @binding(5) var<storage, read_write> partials: array<f32>;
 
 fn delta(token: u32, o: u32) -> f32 {
-    let at = token * params.stride + params.output + o;
-    return token_gradient[at] * select(1.0, SLOPE, params.activation == 1u && tokens[at] < 0.0);
+    let at = token * params.stride + layer.output + o;
+    return token_gradient[at] * select(1.0, SLOPE, layer.activation == 1u && tokens[at] < 0.0);
 }
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let job = linear_invocation(wid, groups, lane);
+    let job = start_layer(wid, groups, lane);
     let all = params.columns * params.rows;
-    let taps = params.taps * params.taps;
-    let bias_quads = (params.outputs + 3u) / 4u;
-    let quads = select(bias_quads, 1u, params.depthwise == 1u);
-    let weights = taps * params.inputs * quads;
-    let per_chunk = weights + select(0u, bias_quads, params.bias != NONE);
+    let taps = layer.taps * layer.taps;
+    let bias_quads = (layer.outputs + 3u) / 4u;
+    let quads = select(bias_quads, 1u, layer.depthwise == 1u);
+    let weights = taps * layer.inputs * quads;
+    let per_chunk = weights + select(0u, bias_quads, layer.bias != NONE);
     let chunks = (all + params.chunk - 1u) / params.chunk;
     if (job >= per_chunk * chunks) {
         return;
@@ -33,25 +34,25 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     var sum: array<f32, 4>;
     if (k >= weights) {
         let o = (k - weights) * 4u;
-        let width = min(4u, params.outputs - o);
+        let width = min(4u, layer.outputs - o);
         for (var token = chunk * params.chunk; token < last; token++) {
             for (var c = 0u; c < width; c++) {
                 sum[c] += delta(token, o + c);
             }
         }
         for (var c = 0u; c < width; c++) {
-            partials[row + params.bias + o + c] = sum[c];
+            partials[row + layer.bias + o + c] = sum[c];
         }
         return;
     }
-    let tap = k / quads / params.inputs;
-    let i = k / quads % params.inputs;
-    let reach = i32(params.taps / 2u);
-    let dx = i32(tap % params.taps) - reach;
-    let dy = i32(tap / params.taps) - reach;
+    let tap = k / quads / layer.inputs;
+    let i = k / quads % layer.inputs;
+    let reach = i32(layer.taps / 2u);
+    let dx = i32(tap % layer.taps) - reach;
+    let dy = i32(tap / layer.taps) - reach;
     var o = k % quads * 4u;
-    var width = min(4u, params.outputs - o);
-    if (params.depthwise == 1u) {
+    var width = min(4u, layer.outputs - o);
+    if (layer.depthwise == 1u) {
         o = i;
         width = 1u;
     }
@@ -61,19 +62,19 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
             continue;
         }
         var x: f32;
-        if (params.from_raw == 1u) {
-            x = raw[source * params.raw_stride + params.input + i];
+        if (layer.from_raw == 1u) {
+            x = raw[params.raw_at + source * params.raw_stride + layer.input + i];
         } else {
-            x = tokens[source * params.stride + params.input + i];
+            x = tokens[source * params.stride + layer.input + i];
         }
         for (var c = 0u; c < width; c++) {
             sum[c] += x * delta(token, o + c);
         }
     }
     for (var c = 0u; c < width; c++) {
-        var to = params.weights + tap * params.inputs * params.outputs + i * params.input_stride + (o + c) * params.output_stride;
-        if (params.depthwise == 1u) {
-            to = params.weights + tap * params.inputs + i;
+        var to = layer.weights + tap * layer.inputs * layer.outputs + i * layer.input_stride + (o + c) * layer.output_stride;
+        if (layer.depthwise == 1u) {
+            to = layer.weights + tap * layer.inputs + i;
         }
         partials[row + to] = sum[c];
     }

@@ -1,5 +1,6 @@
 // Anchors follow the features matched to them (paper eqs. 11, 12). One workgroup an anchor.
 #import shared/rays.wgsl
+#import shared/lane_sums.wgsl
 
 struct Params {
     rays: u32,
@@ -22,9 +23,10 @@ struct Params {
 // Per anchor and class: decayed number of matched rays with that label.
 @group(0) @binding(4) var<storage, read_write> votes: array<f32>;
 
-var<workgroup> sums: array<array<vec4f, 64>, 4>;
-var<workgroup> counts: array<f32, 64>;
 var<workgroup> labels: array<atomic<u32>, 256>;
+// The class with most votes of each lane's.
+var<workgroup> most: array<f32, 64>;
+var<workgroup> winner: array<u32, 64>;
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
@@ -34,9 +36,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(local_invocation_index) 
         atomicStore(&labels[c], 0u);
     }
     workgroupBarrier();
-#for j in 0..4
-    var s${j} = vec4f(0.0);
-#end
+    var sum: array<vec4f, 4>;
     var count = 0.0;
     if (alive) {
         for (var ray = lane; ray < params.rays; ray += 64u) {
@@ -47,34 +47,43 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(local_invocation_index) 
             count += 1.0;
             atomicAdd(&labels[rays[ray].label & 255u], 1u);
 #for j in 0..4
-            s${j} += ray_state[state + ${STATE_FEATURE+j}u];
+            sum[${j}] += ray_state[state + ${STATE_FEATURE+j}u];
 #end
         }
     }
-#for j in 0..4
-    sums[${j}][lane] = s${j};
-#end
-    counts[lane] = count;
+    sum_lanes(lane, sum, count);
+    var best = 0.0;
+    var class_id = bitcast<u32>(anchors[at + 4u].x);
+    if (alive) {
+        for (var c = lane; c < params.classes; c += 64u) {
+            let v = votes[wid.x * params.classes + c] * params.decay + f32(atomicLoad(&labels[c]));
+            votes[wid.x * params.classes + c] = v;
+            if (v > best) {
+                best = v;
+                class_id = c;
+            }
+        }
+    }
+    most[lane] = best;
+    winner[lane] = class_id;
     workgroupBarrier();
-    for (var half = 32u; half > 0u; half /= 2u) {
-        if (lane < half) {
-#for j in 0..4
-            sums[${j}][lane] += sums[${j}][lane + half];
-#end
-            counts[lane] += counts[lane + half];
-        }
-        workgroupBarrier();
-    }
     if (lane != 0u || !alive) {
         return;
     }
-    count = counts[0];
+    // Of equals the first class.
+    for (var k = 1u; k < 64u; k++) {
+        if (most[k] > best || (most[k] == best && best > 0.0 && winner[k] < class_id)) {
+            best = most[k];
+            class_id = winner[k];
+        }
+    }
+    count = lane_weights[0];
     var info = anchors[at + 4u];
     var moved = 0.0;
     if (count > 0.0) {
         let rate = select(1.0 - pow(1.0 - params.beta, count), count / (info.y + count), params.rule == 1u);
 #for j in 0..4
-        let step${j} = rate * (sums[${j}][0] / count - anchors[at + ${j}u]);
+        let step${j} = rate * (lane_features[${j}][0] / count - anchors[at + ${j}u]);
         moved += dot(step${j}, step${j});
         anchors[at + ${j}u] += step${j};
 #end
@@ -82,16 +91,6 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(local_invocation_index) 
     info.y = min(info.y + count, params.memory);
     info.z = info.z * params.decay + count;
     info.w = info.w * params.variation_decay + (1.0 - params.variation_decay) * sqrt(moved);
-    var best = 0.0;
-    var class_id = bitcast<u32>(info.x);
-    for (var c = 0u; c < params.classes; c++) {
-        let v = votes[wid.x * params.classes + c] * params.decay + f32(atomicLoad(&labels[c]));
-        votes[wid.x * params.classes + c] = v;
-        if (v > best) {
-            best = v;
-            class_id = c;
-        }
-    }
     info.x = bitcast<f32>(class_id);
     anchors[at + 4u] = info;
     anchors[at + 5u].x += 1.0;

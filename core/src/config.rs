@@ -218,7 +218,7 @@ pub struct FusionConfig {
     pub gate_kernel: u32,
     /// Give the fusion the map's own semantic feature at each token's point.
     pub memory: bool,
-    /// Training steps a mapping call, half of them on earlier frames.
+    /// Training steps a mapping call, about half of them on earlier frames.
     pub steps: u32,
     /// Training steps on the first frame.
     pub first_steps: u32,
@@ -473,7 +473,7 @@ impl Default for FusionConfig {
             local_kernel: 1,
             gate_kernel: 1,
             memory: true,
-            steps: 4,
+            steps: 1,
             first_steps: 40,
             rate: 1e-2,
             weight_class: 1.0,

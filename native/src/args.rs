@@ -511,6 +511,9 @@ pub struct BenchArgs {
     /// Iterations to average over.
     #[arg(long, value_name = "N", default_value = "10", value_parser = at_least_one)]
     pub iterations: usize,
+    /// Leave out the perceptron on every sample: it takes minutes where one processor does the work.
+    #[arg(long)]
+    pub no_baseline: bool,
     /// Engine.
     #[command(flatten)]
     pub engine: EngineArgs,

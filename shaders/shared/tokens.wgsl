@@ -6,14 +6,13 @@ struct Params {
     width: u32, height: u32, size: u32, slot: u32,
     fx: f32, fy: f32, cx: f32, cy: f32,
     box_min: vec4f,
-    // from_raw: a layer's inputs are raw inputs. input, output: first columns.
-    depth_unit: f32, classes: u32, from_raw: u32, input: u32,
-    inputs: u32, output: u32, outputs: u32, taps: u32,
-    depthwise: u32, activation: u32, weights: u32, bias: u32,
+    // First of the raw inputs, of the dispatch's layers.
+    depth_unit: f32, classes: u32, raw_at: u32, layer: u32,
     // First columns of queries (keys and values follow), of what is added, of the log-sum-exp.
     query: u32, residual: u32, statistics: u32, key_stride: u32,
-    chunk: u32, row: u32, input_stride: u32, output_stride: u32,
-    weight_class: f32, weight_color: f32, train: u32, color_head: u32,
+    // First column of what attention gives.
+    output: u32, chunk: u32, row: u32, train: u32,
+    weight_class: f32, weight_color: f32, color_head: u32, spare0: u32,
 }
 @group(0) @binding(0) var<uniform> params: Params;
 

@@ -26,7 +26,7 @@ use mte_slam_core::{
             APPEARANCE_AT, COLOR_AT, DEPTHWISE_AT, FIRST_AT, FUSED_AT, GATE_AT, GEOMETRY_AT,
             GEOMETRY_INPUTS, GUIDED_AT, HIDDEN, HIDDEN_AT, LOCAL_AT, LOGITS_AT, NO_BIAS,
             NO_RESIDUAL, PATCH_INPUTS, RAW_GEOMETRY, RAW_HISTOGRAM, RAW_MEAN, RAW_PATCH, RAW_POINT,
-            REFINED_AT, SECOND_AT, SEMANTIC_AT, STATISTICS_AT, TILE, TokenParams,
+            REFINED_AT, SECOND_AT, SEMANTIC_AT, STATISTICS_AT, TILE, TokenLayer, TokenParams,
         },
     },
     layout::TARGET_FLOATS,
@@ -45,8 +45,6 @@ fn grid(columns: u32, rows: u32) -> TokenParams {
         classes: CLASSES,
         key_stride: 1,
         residual: NO_RESIDUAL,
-        bias: NO_BIAS,
-        taps: 1,
         chunk: 13,
         ..TokenParams::default()
     }
@@ -217,27 +215,29 @@ fn raw(p: &TokenParams, seed: u64) -> Vec<u32> {
 
 /// Layers of each kind: from raw inputs, linear, 3 x 3 (its outputs no multiple of 4), depthwise;
 /// with bias and without, with rectifier and without.
-fn layers() -> Vec<(&'static str, TokenParams)> {
-    let layer = |raw: u32, input: u32, inputs: u32, output: u32, outputs: u32| TokenParams {
-        from_raw: raw,
+fn layers() -> Vec<(&'static str, TokenLayer)> {
+    let layer = |from_raw: u32, input: u32, inputs: u32, output: u32, outputs: u32| TokenLayer {
+        from_raw,
         input,
         inputs,
         output,
         outputs,
+        taps: 1,
         weights: 5,
+        bias: NO_BIAS,
         input_stride: outputs,
         output_stride: 1,
-        ..usual()
+        ..TokenLayer::default()
     };
-    let bias = |p: TokenParams| TokenParams {
-        bias: p.weights
-            + p.taps * p.taps * p.inputs * if p.depthwise == 1 { 1 } else { p.outputs }
+    let bias = |l: TokenLayer| TokenLayer {
+        bias: l.weights
+            + l.taps * l.taps * l.inputs * if l.depthwise == 1 { 1 } else { l.outputs }
             + 2,
-        ..p
+        ..l
     };
-    let rectified = |p| TokenParams { activation: 1, ..p };
-    let wide = |p| TokenParams { taps: 3, ..p };
-    let depthwise = |p| TokenParams { depthwise: 1, taps: 3, ..p };
+    let rectified = |l| TokenLayer { activation: 1, ..l };
+    let wide = |l| TokenLayer { taps: 3, ..l };
+    let depthwise = |l| TokenLayer { depthwise: 1, taps: 3, ..l };
     let local = layer(0, GUIDED_AT, 16, DEPTHWISE_AT, 16);
     vec![
         ("raw", rectified(bias(layer(1, RAW_GEOMETRY, GEOMETRY_INPUTS, HIDDEN_AT, HIDDEN)))),
@@ -253,74 +253,119 @@ fn layers() -> Vec<(&'static str, TokenParams)> {
     ]
 }
 
-fn token_layer() -> Vec<Case> {
-    layers()
-        .into_iter()
-        .map(|(name, p)| {
-            let buffers = vec![random(8000, 321, 0.5), raw(&p, 322), tokens(&p, 323)];
-            let jobs = p.tokens() * p.outputs.div_ceil(4) as usize;
-            token_case(name, &TOKEN_LAYER, &p, buffers, jobs)
+/// Layers of different sizes that one dispatch runs, with weights of their own.
+fn side_by_side(names: &[&str]) -> Vec<TokenLayer> {
+    let mut at = 3;
+    let all = layers();
+    names
+        .iter()
+        .map(|name| {
+            let (_, mut l) = *all.iter().find(|(n, _)| n == name).expect("a layer's name");
+            let weights = l.taps * l.taps * l.inputs * if l.depthwise == 1 { 1 } else { l.outputs };
+            l.weights = at;
+            at += weights + 1;
+            if l.bias != NO_BIAS {
+                l.bias = at;
+                at += l.outputs;
+            }
+            l
         })
         .collect()
+}
+
+/// A dispatch of some layers, which are neither the first nor the last ones of the table.
+fn layer_case(
+    name: &'static str,
+    kernel: &'static Kernel,
+    layers: &[TokenLayer],
+    buffers: Vec<Vec<u32>>,
+    p: TokenParams,
+    jobs: impl Fn(&TokenLayer) -> usize,
+) -> Case {
+    let mut table = vec![TokenLayer { taps: 1, ..TokenLayer::default() }; 2];
+    table.extend(layers);
+    table.push(TokenLayer { outputs: 16, inputs: 16, taps: 1, ..TokenLayer::default() });
+    let mut all = vec![table.iter().flat_map(words).collect()];
+    all.extend(buffers);
+    let most = layers.iter().map(jobs).max().unwrap_or(0);
+    let mut case = token_case(name, kernel, &TokenParams { layer: 2, ..p }, all, most);
+    case.workgroups[2] = layers.len() as u32;
+    case
+}
+
+/// Raw inputs that start behind others.
+fn raw_behind(p: TokenParams, seed: u64) -> (TokenParams, Vec<u32>) {
+    let mut values = random(7, seed + 1, 1.0);
+    values.extend(raw(&p, seed));
+    (TokenParams { raw_at: 7, ..p }, values)
+}
+
+fn token_layer() -> Vec<Case> {
+    let one = |name, layers: &[TokenLayer]| {
+        let (p, raw) = raw_behind(usual(), 322);
+        let buffers = vec![random(24_000, 321, 0.5), raw, tokens(&p, 323)];
+        let jobs = |l: &TokenLayer| p.tokens() * l.quads();
+        layer_case(name, &TOKEN_LAYER, layers, buffers, p, jobs)
+    };
+    let mut cases: Vec<Case> = layers().into_iter().map(|(name, l)| one(name, &[l])).collect();
+    let several = side_by_side(&["raw", "patch", "histogram", "depthwise", "3 x 3"]);
+    cases.push(one("side by side", &several));
+    cases
 }
 
 fn token_layer_backward() -> Vec<Case> {
-    layers()
-        .into_iter()
-        .filter(|(_, p)| p.from_raw == 0)
-        .map(|(name, p)| {
-            let tokens = tokens(&p, 323);
-            let gradient = random(tokens.len(), 324, 1.0);
-            let buffers = vec![random(8000, 321, 0.5), tokens, gradient];
-            let jobs = p.tokens() * p.inputs as usize;
-            token_case(name, &TOKEN_LAYER_BACKWARD, &p, buffers, jobs)
-        })
-        .collect()
+    let one = |name, layers: &[TokenLayer]| {
+        let p = usual();
+        let tokens = tokens(&p, 323);
+        let gradient = random(tokens.len(), 324, 1.0);
+        let buffers = vec![random(24_000, 321, 0.5), tokens, gradient];
+        let jobs = |l: &TokenLayer| p.tokens() * l.inputs as usize;
+        layer_case(name, &TOKEN_LAYER_BACKWARD, layers, buffers, p, jobs)
+    };
+    let inner = layers().into_iter().filter(|(_, l)| l.from_raw == 0);
+    let mut cases: Vec<Case> = inner.map(|(name, l)| one(name, &[l])).collect();
+    let several = side_by_side(&["linear", "linear, rectified", "depthwise"]);
+    cases.push(one("side by side", &several));
+    cases
 }
 
 fn token_weights() -> Vec<Case> {
+    let plain = TokenLayer { input: FUSED_AT, inputs: 16, taps: 1, ..TokenLayer::default() };
     // The class head's weights are stored output-major.
-    let head = TokenParams {
-        input: FUSED_AT,
-        inputs: 16,
+    let head = TokenLayer {
         output: LOGITS_AT,
         outputs: CLASSES,
         bias: CLASSES * 16,
         input_stride: 1,
         output_stride: 16,
-        ..usual()
+        ..plain
     };
     // Rows with room for a fourth output that there is not.
-    let color = TokenParams {
-        input: FUSED_AT,
-        inputs: 16,
+    let color = TokenLayer {
         output: COLOR_AT,
         outputs: 3,
         bias: 64,
         input_stride: 4,
         output_stride: 1,
-        chunk: 40,
-        ..usual()
+        ..plain
     };
-    let mut layers = layers();
-    layers.extend([("class head", head), ("colour head", color)]);
-    layers
-        .into_iter()
-        .map(|(name, p)| {
-            let tokens = tokens(&p, 331);
-            let gradient = random(tokens.len(), 332, 1.0);
-            let p = TokenParams { row: 8000, ..p };
-            let chunks = p.tokens().div_ceil(p.chunk as usize);
-            // Each layer writes its part only.
-            let partials = vec![0; chunks * p.row as usize];
-            let quads = p.outputs.div_ceil(4) as usize;
-            let jobs = (p.taps * p.taps * p.inputs) as usize
-                * if p.depthwise == 1 { 1 } else { quads }
-                + if p.bias == NO_BIAS { 0 } else { quads };
-            let buffers = vec![raw(&p, 333), tokens, gradient, partials];
-            token_case(name, &TOKEN_WEIGHTS, &p, buffers, jobs * chunks)
-        })
-        .collect()
+    let one = |name, chunk, layers: &[TokenLayer]| {
+        let (p, raw) = raw_behind(TokenParams { row: 24_000, chunk, ..usual() }, 333);
+        let tokens = tokens(&p, 331);
+        let gradient = random(tokens.len(), 332, 1.0);
+        let chunks = p.tokens().div_ceil(chunk as usize);
+        // Each layer writes its part only.
+        let partials = vec![0; chunks * p.row as usize];
+        let buffers = vec![raw, tokens, gradient, partials];
+        let jobs = |l: &TokenLayer| l.weight_jobs() * chunks;
+        layer_case(name, &TOKEN_WEIGHTS, layers, buffers, p, jobs)
+    };
+    let mut cases: Vec<Case> = layers().into_iter().map(|(name, l)| one(name, 13, &[l])).collect();
+    cases.push(one("class head", 13, &[head]));
+    cases.push(one("colour head", 40, &[color]));
+    let several = side_by_side(&["raw", "patch", "histogram", "linear", "depthwise", "3 x 3"]);
+    cases.push(one("side by side", 13, &several));
+    cases
 }
 
 fn gate(p: &TokenParams) -> Case {

@@ -74,12 +74,14 @@ fn device_with(engine: Engine, fusion: FusionConfig, channels: u32) -> Device {
     let mut values = read(&mut d, tensor.values, tensor.floats);
     let mut random = TestRandom(401);
     for layer in &layers {
-        if layer.bias != NO_BIAS {
-            let biases = layer.bias as usize..(layer.bias + layer.bias_count()) as usize;
+        if layer.shape.bias != NO_BIAS {
+            let biases =
+                layer.shape.bias as usize..(layer.shape.bias + layer.bias_count()) as usize;
             values[biases].fill_with(|| random.uniform(-0.2, 0.2));
         }
         if layer.name.starts_with(['Q', 'K']) {
-            let weights = layer.weights as usize..(layer.weights + layer.weight_count()) as usize;
+            let weights =
+                layer.shape.weights as usize..(layer.shape.weights + layer.weight_count()) as usize;
             values[weights].iter_mut().for_each(|w| *w *= 2.0);
         }
     }
@@ -186,14 +188,16 @@ fn fusion_gradients(fusion: FusionConfig) {
     assert_eq!((f.columns, f.rows), (13, 7));
     let gradient = read(&mut d, tensor.gradient, tensor.floats);
     for layer in layers {
-        let weights = layer.weights as usize..(layer.weights + layer.weight_count()) as usize;
+        let weights =
+            layer.shape.weights as usize..(layer.shape.weights + layer.weight_count()) as usize;
         if layer.name == "depthwise" && !local {
             assert!(gradient[weights].iter().all(|g| *g == 0.0), "nothing reads it");
             continue;
         }
         check(&mut d, tensor.values, &gradient, weights, layer.name, &mut fusion_loss);
-        if layer.bias != NO_BIAS {
-            let biases = layer.bias as usize..(layer.bias + layer.bias_count()) as usize;
+        if layer.shape.bias != NO_BIAS {
+            let biases =
+                layer.shape.bias as usize..(layer.shape.bias + layer.bias_count()) as usize;
             let name = format!("{}, biases", layer.name);
             check(&mut d, tensor.values, &gradient, biases, &name, &mut fusion_loss);
         }
@@ -221,7 +225,8 @@ fn gradients_of_the_projection_of_feature_maps() {
     let tensor = f.parameters;
     let layer = *f.layers.iter().find(|l| l.name == "feature projection").unwrap();
     let gradient = read(&mut d, tensor.gradient, tensor.floats);
-    let weights = layer.weights as usize..(layer.weights + layer.weight_count()) as usize;
+    let weights =
+        layer.shape.weights as usize..(layer.shape.weights + layer.weight_count()) as usize;
     check(&mut d, tensor.values, &gradient, weights, layer.name, &mut fusion_loss);
 }
 
@@ -257,7 +262,7 @@ fn feature_maps_take_the_place_of_labels() {
     let map = feature_map(channels as usize, SLOT).resampled(13, 7, [104.0 / 109.0, 56.0 / 59.0]);
     for (token, cell) in map.chunks_exact(channels as usize).enumerate() {
         for o in 0..16 {
-            let weight = |i: usize| w[layer.weights as usize + i * 16 + o];
+            let weight = |i: usize| w[layer.shape.weights as usize + i * 16 + o];
             let expected: f32 = cell.iter().enumerate().map(|(i, x)| x * weight(i)).sum();
             let found = s[token * 16 + o];
             assert!((found - expected).abs() < 1e-4, "{token} {o}: {found} {expected}");

@@ -26,11 +26,11 @@ use crate::{
             APPEARANCE_AT, COLOR_AT, DEPTHWISE_AT, FIRST_AT, FUSED_AT, GATE_AT, GEOMETRY_AT,
             GEOMETRY_INPUTS, GUIDED_AT, HIDDEN, HIDDEN_AT, LOCAL_AT, LOGITS_AT, NO_BIAS,
             NO_RESIDUAL, PATCH_INPUTS, RAW_GEOMETRY, RAW_HISTOGRAM, RAW_PATCH, REFINED_AT,
-            SECOND_AT, SEMANTIC_AT, STATISTICS_AT, TILE, TokenParams,
+            SECOND_AT, SEMANTIC_AT, STATISTICS_AT, TILE, TokenLayer, TokenParams,
         },
     },
     layout::{FieldParams, HEAD_FLOATS, TARGET_FLOATS},
-    recording::{BufferId, Recording},
+    recording::{BufferId, Recording, workgroups_1d},
 };
 use alloc::{vec, vec::Vec};
 #[cfg(not(feature = "std"))]
@@ -41,18 +41,8 @@ use num_traits::Float as _;
 pub struct Layer {
     /// What it is called in the paper or the design.
     pub name: &'static str,
-    from_raw: bool,
-    input: u32,
-    inputs: u32,
-    output: u32,
-    outputs: u32,
-    taps: u32,
-    depthwise: bool,
-    activation: bool,
-    /// First weight in the parameter buffer.
-    pub weights: u32,
-    /// First bias in the parameter buffer, or `NO_BIAS`.
-    pub bias: u32,
+    /// What the kernels know of it; `weights` and `bias` are places in the parameter buffer.
+    pub shape: TokenLayer,
     /// Outputs a row of weights has room for.
     room: u32,
 }
@@ -60,11 +50,12 @@ pub struct Layer {
 impl Layer {
     /// Number of weights.
     pub fn weight_count(&self) -> u32 {
-        self.taps * self.taps * self.inputs * if self.depthwise { 1 } else { self.room }
+        let l = &self.shape;
+        l.taps * l.taps * l.inputs * if l.depthwise == 1 { 1 } else { self.room }
     }
     /// Number of biases.
     pub fn bias_count(&self) -> u32 {
-        if self.bias == NO_BIAS { 0 } else { self.room }
+        if self.shape.bias == NO_BIAS { 0 } else { self.room }
     }
 }
 
@@ -77,23 +68,24 @@ fn layers(classes: u32, channels: u32, config: &FusionConfig) -> (Vec<Layer>, u3
             let (depthwise, activation, biased) = kind;
             // `token_loss` reads the colour head four columns wide; layers have no padding.
             let room = if name == "colour head" { 4 } else { outputs };
-            let mut layer = Layer {
-                name,
-                from_raw,
+            let shape = TokenLayer {
+                from_raw: u32::from(from_raw),
                 input,
                 inputs,
                 output,
                 outputs,
                 taps,
-                depthwise,
-                activation,
+                depthwise: u32::from(depthwise),
+                activation: u32::from(activation),
                 weights: at,
                 bias: NO_BIAS,
-                room,
+                input_stride: room,
+                output_stride: 1,
             };
+            let mut layer = Layer { name, shape, room };
             at += layer.weight_count();
             if biased {
-                layer.bias = at;
+                layer.shape.bias = at;
                 at += layer.bias_count();
             }
             all.push(layer);
@@ -135,6 +127,107 @@ fn layers(classes: u32, channels: u32, config: &FusionConfig) -> (Vec<Layer>, u3
 /// The layer that reads feature maps, which lie in a buffer of their own.
 const FEATURE_LAYER: &str = "feature projection";
 
+/// Layers side by side, by what they wait for: for raw inputs, their embeddings, the geometry, the
+/// first attention, the depthwise convolution, and both sides of the gate.
+const FORWARD: [&[&str]; 6] = [
+    &["geometry hidden", "class embedding", "patch embedding"],
+    &["geometry", "K1", "V1", "K2", "V2"],
+    &["Q1"],
+    &["Q2", "depthwise"],
+    &["pointwise"],
+    &["gate"],
+];
+/// The same backwards: no two of a group add to the same gradients. Behind the second come the
+/// gradients of the second attention, behind the fourth those of the first. The loss has already
+/// sent the colour head's on.
+const BACKWARD: [&[&str]; 6] = [
+    &["gate"],
+    &["pointwise"],
+    &["depthwise", "V2"],
+    &["Q2", "K2"],
+    &["V1", "K1", "Q1"],
+    &["geometry"],
+];
+
+/// Layers that one dispatch runs.
+struct Group {
+    /// The first one's place in the table.
+    first: u32,
+    layers: Vec<TokenLayer>,
+}
+
+impl Group {
+    /// Workgroups for as many invocations as the layer with most has.
+    fn workgroups(&self, invocations: impl Fn(&TokenLayer) -> usize) -> [u32; 3] {
+        let most = self.layers.iter().map(invocations).max().unwrap_or(0);
+        let [x, y, _] = workgroups_1d(most, TOKEN_LAYER.workgroup_size);
+        [x, y, self.layers.len() as u32]
+    }
+}
+
+/// The dispatches of layers, and the table they find them in.
+struct Schedule {
+    table: BufferId,
+    /// As [`FORWARD`].
+    forward: Vec<Group>,
+    /// As [`BACKWARD`].
+    backward: Vec<Group>,
+    /// All layers but the one of feature maps.
+    weights: Group,
+    features: Option<Group>,
+    /// The class head, which is shared with the field; its weights are stored output-major.
+    head: Group,
+}
+
+impl Schedule {
+    fn new(
+        e: &mut Engine,
+        layers: &[Layer],
+        classes: u32,
+        config: &FusionConfig,
+    ) -> Result<Schedule, EngineError> {
+        let mut table: Vec<TokenLayer> = Vec::new();
+        let mut group = |layers: Vec<TokenLayer>| {
+            let first = table.len() as u32;
+            table.extend(&layers);
+            Group { first, layers }
+        };
+        let used = |l: &&Layer| config.local || l.name != "depthwise";
+        let mut all = |groups: [&[&str]; 6]| {
+            let of = |names: &[&str]| {
+                let named = layers.iter().filter(used).filter(|l| names.contains(&l.name));
+                group(named.map(|l| l.shape).collect())
+            };
+            groups.map(of).into_iter().collect()
+        };
+        let (forward, backward) = (all(FORWARD), all(BACKWARD));
+        let (features, rest): (Vec<&Layer>, _) =
+            layers.iter().filter(used).partition(|l| l.name == FEATURE_LAYER);
+        let weights = group(rest.iter().map(|l| l.shape).collect());
+        let features = features.first().map(|l| group(vec![l.shape]));
+        let head = group(vec![TokenLayer {
+            from_raw: 0,
+            input: FUSED_AT,
+            inputs: 16,
+            output: LOGITS_AT,
+            outputs: classes,
+            taps: 1,
+            depthwise: 0,
+            activation: 0,
+            weights: 0,
+            bias: classes * 16,
+            input_stride: 1,
+            output_stride: 16,
+        }]);
+        let words: &[u32] = bytemuck::cast_slice(&table);
+        let buffer = e.create_buffer("token layers", words.len())?;
+        let mut r = Recording::default();
+        r.upload(buffer, 0, words);
+        e.submit(&r)?;
+        Ok(Schedule { table: buffer, forward, backward, weights, features, head })
+    }
+}
+
 /// Feature maps of the stored frames, on the token grid.
 #[derive(Clone, Copy, Debug)]
 pub struct FeatureMaps {
@@ -164,6 +257,7 @@ pub struct Fusion {
     maps: FeatureMaps,
     /// Origin of the encoded positions: it must not move when the map grows.
     origin_m: [f32; 4],
+    schedule: Schedule,
     raw: BufferId,
     raw_stride: u32,
     partials: BufferId,
@@ -189,6 +283,7 @@ impl Fusion {
         let padded = classes.next_multiple_of(4);
         let (stride, raw_stride) = (LOGITS_AT + padded, RAW_HISTOGRAM + padded);
         let (layers, floats) = layers(classes, maps.channels, config);
+        let schedule = Schedule::new(e, &layers, classes, config)?;
         let fusion = Fusion {
             parameters: Trained::new(e, "fusion", floats as usize)?,
             columns,
@@ -199,6 +294,7 @@ impl Fusion {
             config: config.clone(),
             maps,
             origin_m,
+            schedule,
             raw: e.create_buffer("raw tokens", tokens * raw_stride as usize)?,
             raw_stride,
             partials: e.create_buffer("fusion partials", (CHUNKS * floats) as usize)?,
@@ -209,16 +305,16 @@ impl Fusion {
         let mut w = vec![0.0_f32; floats as usize];
         for layer in &fusion.layers {
             // A histogram has one input in effect: its embedding is not scaled down by the classes.
+            let l = &layer.shape;
             let inputs = match layer.name {
                 "class embedding" => 1,
-                _ if layer.depthwise => 9,
-                _ => layer.inputs * layer.taps * layer.taps,
+                _ if l.depthwise == 1 => 9,
+                _ => l.inputs * l.taps * l.taps,
             };
             let gain = if layer.name == "gate" { 0.3 } else { 1.4 };
             let limit = gain * (3.0 / inputs as f32).sqrt();
-            for i in layer.weights..layer.weights + layer.weight_count() {
-                let unused =
-                    layer.room > layer.outputs && (i - layer.weights) % layer.room >= layer.outputs;
+            for i in l.weights..l.weights + layer.weight_count() {
+                let unused = layer.room > l.outputs && (i - l.weights) % layer.room >= l.outputs;
                 if !unused {
                     w[i as usize] = (2.0 * random_f32(seed, 0x1720, i, 9) - 1.0) * limit;
                 }
@@ -233,8 +329,9 @@ impl Fusion {
     /// Parameters that training moves: no padding, nor layers that the configuration leaves out.
     pub fn trained_count(&self) -> usize {
         let used = self.layers.iter().filter(|l| self.config.local || l.name != "depthwise");
-        used.map(|l| {
-            let outputs = if l.depthwise { 1 } else { l.outputs };
+        used.map(|layer| {
+            let l = &layer.shape;
+            let outputs = if l.depthwise == 1 { 1 } else { l.outputs };
             let biases = if l.bias == NO_BIAS { 0 } else { l.outputs };
             (l.taps * l.taps * l.inputs * outputs + biases) as usize
         })
@@ -261,14 +358,37 @@ impl Fusion {
         r.upload(self.maps.buffer, slot as usize * values.len(), &values);
     }
 
-    /// What a layer's kernels read as raw inputs, and their parameters for it.
-    fn raw_inputs(&self, layer: &Layer, p: TokenParams) -> (BufferId, TokenParams) {
-        if layer.name != FEATURE_LAYER {
-            return (self.raw, p);
-        }
+    /// The feature maps as raw inputs.
+    fn feature_inputs(&self, p: TokenParams) -> TokenParams {
         let channels = self.maps.channels;
-        let input = p.slot * self.count() as u32 * channels;
-        (self.maps.buffer, TokenParams { raw_stride: channels, input, ..p })
+        TokenParams { raw_stride: channels, raw_at: p.slot * self.count() as u32 * channels, ..p }
+    }
+
+    fn record_layers(&self, r: &mut Recording, group: &Group, raw: BufferId, p: TokenParams) {
+        let n = self.count();
+        r.dispatch(
+            &TOKEN_LAYER,
+            &TokenParams { layer: group.first, ..p },
+            &[self.schedule.table, self.parameters.values, raw, self.tokens],
+            group.workgroups(|l| n * l.quads()),
+        );
+    }
+
+    fn record_weights(
+        &self,
+        r: &mut Recording,
+        group: &Group,
+        buffers: [BufferId; 2],
+        p: TokenParams,
+    ) {
+        let [raw, partials] = buffers;
+        let chunks = self.count().div_ceil(p.chunk as usize);
+        r.dispatch(
+            &TOKEN_WEIGHTS,
+            &TokenParams { layer: group.first, ..p },
+            &[self.schedule.table, raw, self.tokens, self.token_gradient, partials],
+            group.workgroups(|l| l.weight_jobs() * chunks),
+        );
     }
 
     /// Tokens of a frame.
@@ -304,6 +424,11 @@ pub(super) fn target_floats(camera: &Camera, config: &FusionConfig) -> usize {
 }
 
 impl Device {
+    /// Training steps of the fusion so far.
+    pub fn fusion_steps(&self) -> u32 {
+        self.fusion.as_ref().map_or(0, |f| f.step)
+    }
+
     fn token_params(&self, f: &Fusion, slot: u32) -> TokenParams {
         let c = &self.camera;
         TokenParams {
@@ -326,7 +451,6 @@ impl Device {
             chunk: (f.count() as u32).div_ceil(CHUNKS),
             row: f.parameters.floats as u32,
             residual: NO_RESIDUAL,
-            bias: NO_BIAS,
             weight_class: f.config.weight_class as f32,
             weight_color: f.config.weight_color as f32,
             ..TokenParams::default()
@@ -349,26 +473,19 @@ impl Device {
             let inputs = [self.semantic.values, self.decoders.values, f.raw];
             r.dispatch_1d(&RECALL_TOKENS, &p, &inputs, n);
         }
-        for layer in &f.layers {
-            if layer.name == "colour head" || (layer.name == "depthwise" && !f.config.local) {
-                continue;
+        if let Some(group) = &f.schedule.features {
+            f.record_layers(r, group, f.maps.buffer, f.feature_inputs(p));
+        }
+        for (i, group) in f.schedule.forward.iter().enumerate() {
+            f.record_layers(r, group, f.raw, p);
+            match i {
+                2 => record_attention(r, f, &ATTEND_TOKENS, &first(f, p), n),
+                4 => record_attention(r, f, &ATTEND_TOKENS, &second(f, p), n),
+                _ => {}
             }
-            if layer.name == "Q2" {
-                record_attention(r, f, &ATTEND_TOKENS, &first(f, p), n);
-            }
-            if layer.name == "depthwise" || (layer.name == "pointwise" && !f.config.local) {
-                record_attention(r, f, &ATTEND_TOKENS, &second(f, p), n);
-            }
-            let (raw, p) = f.raw_inputs(layer, layer_params(layer, p));
-            r.dispatch_1d(
-                &TOKEN_LAYER,
-                &p,
-                &[f.parameters.values, raw, f.tokens],
-                n * layer.outputs.div_ceil(4) as usize,
-            );
         }
         r.dispatch_1d(&GATE_TOKENS, &p, &[f.tokens], n);
-        let color_head = f.layers[f.layers.len() - 1].weights;
+        let color_head = f.layers[f.layers.len() - 1].shape.weights;
         r.dispatch_1d(
             &TOKEN_LOSS,
             &TokenParams { train: u32::from(train), color_head, ..p },
@@ -393,37 +510,22 @@ impl Device {
         r.clear(f.token_gradient, 0, n * f.stride as usize);
         self.record_fusion(r, slot, true);
         r.dispatch_1d(&GATE_BACKWARD, &p, &[f.tokens, f.token_gradient], n);
-        for layer in f.layers.iter().rev() {
-            if layer.name == "depthwise" && !f.config.local {
-                record_attention_backward(r, f, &second(f, p));
-                continue;
+        for (i, group) in f.schedule.backward.iter().enumerate() {
+            match i {
+                2 => record_attention_backward(r, f, &second(f, p)),
+                4 => record_attention_backward(r, f, &first(f, p)),
+                _ => {}
             }
-            if layer.name == "V2" && f.config.local {
-                record_attention_backward(r, f, &second(f, p));
-            }
-            if layer.name == "V1" {
-                record_attention_backward(r, f, &first(f, p));
-            }
-            let (raw, p) = f.raw_inputs(layer, layer_params(layer, p));
-            let taps = (layer.taps * layer.taps) as usize;
-            let quads = layer.outputs.div_ceil(4) as usize;
-            let jobs = taps * layer.inputs as usize * if layer.depthwise { 1 } else { quads }
-                + if layer.bias == NO_BIAS { 0 } else { quads };
-            r.dispatch_1d(
-                &TOKEN_WEIGHTS,
-                &p,
-                &[raw, f.tokens, f.token_gradient, f.partials],
-                jobs * n.div_ceil(p.chunk as usize),
+            r.dispatch(
+                &TOKEN_LAYER_BACKWARD,
+                &TokenParams { layer: group.first, ..p },
+                &[f.schedule.table, f.parameters.values, f.tokens, f.token_gradient],
+                group.workgroups(|l| n * l.inputs as usize),
             );
-            // The loss has already sent the colour head's gradient on to F.
-            if !layer.from_raw && layer.name != "colour head" {
-                r.dispatch_1d(
-                    &TOKEN_LAYER_BACKWARD,
-                    &p,
-                    &[f.parameters.values, f.tokens, f.token_gradient],
-                    n * layer.inputs as usize,
-                );
-            }
+        }
+        f.record_weights(r, &f.schedule.weights, [f.raw, f.partials], p);
+        if let Some(group) = &f.schedule.features {
+            f.record_weights(r, group, [f.maps.buffer, f.partials], f.feature_inputs(p));
         }
         let chunks = (n as u32).div_ceil(p.chunk);
         let floats = f.parameters.floats as u32;
@@ -433,26 +535,8 @@ impl Device {
             &[f.partials, f.parameters.gradient],
             floats as usize,
         );
-        // The class head is shared with the field; its weights are stored output-major.
         let row = self.classes * 17;
-        let head = TokenParams {
-            input: FUSED_AT,
-            inputs: 16,
-            output: LOGITS_AT,
-            outputs: self.classes,
-            taps: 1,
-            bias: self.classes * 16,
-            row,
-            input_stride: 1,
-            output_stride: 16,
-            ..p
-        };
-        r.dispatch_1d(
-            &TOKEN_WEIGHTS,
-            &head,
-            &[f.raw, f.tokens, f.token_gradient, f.head_partials],
-            17 * self.classes.div_ceil(4) as usize * chunks as usize,
-        );
+        f.record_weights(r, &f.schedule.head, [f.raw, f.head_partials], TokenParams { row, ..p });
         r.dispatch_1d(
             &REDUCE_PARTIALS,
             &ReducePartialsParams { rows: chunks, columns: row, row, offset: HEAD_FLOATS as u32 },
@@ -494,24 +578,6 @@ impl Device {
             &step(HEAD_FLOATS as u32, self.classes * 17, rate_head, self.step + f.step),
             &[t.values, t.gradient, t.moment1, t.moment2, self.status],
         );
-    }
-}
-
-fn layer_params(layer: &Layer, p: TokenParams) -> TokenParams {
-    TokenParams {
-        from_raw: u32::from(layer.from_raw),
-        input: layer.input,
-        inputs: layer.inputs,
-        output: layer.output,
-        outputs: layer.outputs,
-        taps: layer.taps,
-        depthwise: u32::from(layer.depthwise),
-        activation: u32::from(layer.activation),
-        weights: layer.weights,
-        bias: layer.bias,
-        input_stride: layer.room,
-        output_stride: 1,
-        ..p
     }
 }
 

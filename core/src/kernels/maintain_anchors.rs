@@ -41,7 +41,7 @@ kernel! {
     /// their class's; where all slots are taken, a class without any takes the place of the least
     /// important one that is not its class's last. Counts what it did (alive, spawned, dropped, merged).
     pub static MAINTAIN_ANCHORS = "maintain_anchors" {
-        workgroup_size: 64,
+        workgroup_size: 256,
         params: MaintainAnchorsParams,
         twin: twin,
         bindings: [

@@ -1,7 +1,7 @@
-//! Gradients of the weights of a layer on the token grid.
+//! Gradients of the weights of layers on the token grid.
 use super::{
     CpuDispatch, load_f32, store_f32,
-    tokens::{NO_BIAS, SLOPE, TokenParams},
+    tokens::{NO_BIAS, SLOPE, TokenParams, for_each_layer_workgroup},
 };
 use alloc::vec;
 
@@ -11,27 +11,31 @@ kernel! {
         workgroup_size: 64,
         params: TokenParams,
         twin: twin,
-        bindings: [raw: Read, tokens: Read, token_gradient: ReadWrite, partials: ReadWrite],
+        bindings: [
+            layers: Read,
+            raw: Read,
+            tokens: Read,
+            token_gradient: ReadWrite,
+            partials: ReadWrite,
+        ],
     }
 }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: TokenParams = dispatch.params();
-    let (raw, tokens) = (dispatch.read_f32(0), dispatch.read_f32(1));
-    let (gradient, partials) = (dispatch.write(2), dispatch.write(3));
-    let (inputs, outputs, stride) = (p.inputs as usize, p.outputs as usize, p.stride as usize);
-    let taps = (p.taps * p.taps) as usize;
-    let depthwise = p.depthwise == 1;
-    let biased = p.bias != NO_BIAS;
-    let bias_quads = outputs.div_ceil(4);
-    let per_chunk = taps * inputs * if depthwise { 1 } else { bias_quads }
-        + if biased { bias_quads } else { 0 };
+    let (raw, tokens) = (dispatch.read_f32(1), dispatch.read_f32(2));
+    let (gradient, partials) = (dispatch.write(3), dispatch.write(4));
+    let stride = p.stride as usize;
     let chunks = p.tokens().div_ceil(p.chunk as usize);
-    let reach = p.taps as i32 / 2;
-    dispatch.for_each_workgroup(|group| {
+    for_each_layer_workgroup(dispatch, &p, |l, group| {
+        let (inputs, outputs) = (l.inputs as usize, l.outputs as usize);
+        let taps = (l.taps * l.taps) as usize;
+        let depthwise = l.depthwise == 1;
+        let per_chunk = l.weight_jobs();
+        let reach = l.taps as i32 / 2;
         // The shader's invocation is a few weights of a chunk; here the workgroup of a chunk's
         // first invocation does the chunk, a token at a time.
-        let first = group as usize * 64;
+        let first = group * 64;
         for chunk in first.div_ceil(per_chunk)..(first + 64).div_ceil(per_chunk).min(chunks) {
             let width = if depthwise { 1 } else { outputs };
             let mut sums = vec![0.0_f32; taps * inputs * width];
@@ -40,22 +44,22 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             let mut x = vec![0.0_f32; inputs];
             let end = ((chunk + 1) * p.chunk as usize).min(p.tokens());
             for token in chunk * p.chunk as usize..end {
-                let at = token * stride + p.output as usize;
+                let at = token * stride + l.output as usize;
                 for (o, d) in delta.iter_mut().enumerate() {
-                    let slope = if p.activation == 1 && tokens[at + o] < 0.0 { SLOPE } else { 1.0 };
+                    let slope = if l.activation == 1 && tokens[at + o] < 0.0 { SLOPE } else { 1.0 };
                     *d = slope * load_f32(&gradient[at + o]);
                 }
                 biases.iter_mut().zip(&delta).for_each(|(b, d)| *b += d);
                 for tap in 0..taps {
-                    let dx = tap as i32 % p.taps as i32 - reach;
-                    let dy = tap as i32 / p.taps as i32 - reach;
+                    let dx = tap as i32 % l.taps as i32 - reach;
+                    let dy = tap as i32 / l.taps as i32 - reach;
                     let Some(from) = p.neighbour(token, dx, dy) else { continue };
-                    let (values, row) = if p.from_raw == 1 {
-                        (raw, p.raw_stride as usize)
+                    let (values, start, row) = if l.from_raw == 1 {
+                        (raw, p.raw_at, p.raw_stride as usize)
                     } else {
-                        (tokens, stride)
+                        (tokens, 0, stride)
                     };
-                    let at = from * row + p.input as usize;
+                    let at = (start + l.input) as usize + from * row;
                     x.copy_from_slice(&values[at..at + inputs]);
                     let sums = &mut sums[tap * inputs * width..(tap + 1) * inputs * width];
                     if depthwise {
@@ -75,14 +79,14 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                     tap * inputs + i
                 } else {
                     tap * inputs * outputs
-                        + i * p.input_stride as usize
-                        + o * p.output_stride as usize
+                        + i * l.input_stride as usize
+                        + o * l.output_stride as usize
                 };
-                store_f32(&row[p.weights as usize + to], *s);
+                store_f32(&row[l.weights as usize + to], *s);
             }
-            if biased {
+            if l.bias != NO_BIAS {
                 for (o, s) in biases.iter().enumerate() {
-                    store_f32(&row[p.bias as usize + o], *s);
+                    store_f32(&row[l.bias as usize + o], *s);
                 }
             }
         }

@@ -1,5 +1,5 @@
 //! What the kernels of the token grid share: parameters, and the columns of a token's row.
-use super::load_f32;
+use super::{CpuDispatch, load_f32};
 use core::sync::atomic::AtomicU32;
 
 /// Floats of the geometry encoding: normal (3), position (3), sines and cosines of 7 bands (42),
@@ -95,26 +95,10 @@ params! {
         depth_unit: f32,
         /// Classes.
         classes: u32,
-        /// 1: a layer's inputs are raw inputs.
-        from_raw: u32,
-        /// First column of a layer's inputs.
-        input: u32,
-        /// Inputs of a layer.
-        inputs: u32,
-        /// First column of a layer's outputs.
-        output: u32,
-        /// Outputs of a layer.
-        outputs: u32,
-        /// Edge of a layer's kernel: 1 or 3.
-        taps: u32,
-        /// 1: each output sees its own input only.
-        depthwise: u32,
-        /// 1: leaky rectifier behind the layer.
-        activation: u32,
-        /// First weight of a layer.
-        weights: u32,
-        /// First bias, or `NO_BIAS`.
-        bias: u32,
+        /// First float of the raw inputs.
+        raw_at: u32,
+        /// First layer of the dispatch.
+        layer: u32,
         /// First column of the queries; keys and values follow.
         query: u32,
         /// Column added to what attention gives, or `NO_RESIDUAL`.
@@ -123,23 +107,81 @@ params! {
         statistics: u32,
         /// Every n-th column and row of the grid is a key.
         key_stride: u32,
+        /// First column of what attention gives.
+        output: u32,
         /// Tokens a chunk of the weights' gradients.
         chunk: u32,
         /// Floats a row of partial gradients.
         row: u32,
-        /// Floats from one input's weights to the next one's.
-        input_stride: u32,
-        /// Floats from one output's weights to the next one's.
-        output_stride: u32,
+        /// 1: write the gradients.
+        train: u32,
         /// Weight of the cross-entropy.
         weight_class: f32,
         /// Weight of the colour loss.
         weight_color: f32,
-        /// 1: write the gradients.
-        train: u32,
         /// First weight of the colour head.
         color_head: u32,
+        /// Unused.
+        spare0: u32,
     }
+}
+
+params! {
+    /// A layer on the token grid. A dispatch runs several, one for each workgroup in z.
+    pub struct TokenLayer {
+        /// 1: inputs are raw inputs.
+        from_raw: u32,
+        /// First column of the inputs.
+        input: u32,
+        /// Inputs.
+        inputs: u32,
+        /// First column of the outputs.
+        output: u32,
+        /// Outputs.
+        outputs: u32,
+        /// Edge of the kernel: 1 or 3.
+        taps: u32,
+        /// 1: each output sees its own input only.
+        depthwise: u32,
+        /// 1: leaky rectifier behind the layer.
+        activation: u32,
+        /// First weight.
+        weights: u32,
+        /// First bias, or `NO_BIAS`.
+        bias: u32,
+        /// Floats from one input's weights to the next one's.
+        input_stride: u32,
+        /// Floats from one output's weights to the next one's.
+        output_stride: u32,
+    }
+}
+
+impl TokenLayer {
+    /// Fours of outputs.
+    pub fn quads(&self) -> usize {
+        self.outputs.div_ceil(4) as usize
+    }
+
+    /// Invocations of `token_weights` a chunk of tokens.
+    pub fn weight_jobs(&self) -> usize {
+        let taps = (self.taps * self.taps * self.inputs) as usize;
+        taps * if self.depthwise == 1 { 1 } else { self.quads() }
+            + if self.bias == NO_BIAS { 0 } else { self.quads() }
+    }
+}
+
+/// Calls `body` with the layer (the first binding holds them) and the workgroup's number within it,
+/// for all workgroups of a dispatch, in parallel.
+pub(super) fn for_each_layer_workgroup(
+    dispatch: &CpuDispatch<'_>,
+    p: &TokenParams,
+    body: impl Fn(&TokenLayer, usize) + Sync + Send,
+) {
+    let layers: &[TokenLayer] = bytemuck::cast_slice(dispatch.read_u32(0));
+    let [x, y, _] = dispatch.workgroups;
+    dispatch.for_each_workgroup(|group| {
+        body(&layers[(p.layer + group / (x * y)) as usize], (group % (x * y)) as usize);
+    });
 }
 
 /// No bias.

@@ -400,7 +400,7 @@ impl Slam {
                 .collect();
             for step in 0..steps_due(fusion_steps, iterations, i, 1) {
                 // Every other step goes over an earlier frame: the fusion must not forget.
-                let k = if (i + step).is_multiple_of(2) && recent > 0 {
+                let k = if device.fusion_steps().is_multiple_of(2) && recent > 0 {
                     n - 1
                 } else {
                     let at = random_u32(seed, iteration, step, 22) as usize % chosen.len();

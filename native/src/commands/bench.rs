@@ -108,6 +108,9 @@ struct Modules {
     suppressor: Measured,
     /// All of it over the call.
     ratio: f64,
+    /// Dispatches of the call without modules, and those of the modules: what counts where a GPU is
+    /// not full.
+    dispatches: [usize; 2],
 }
 
 /// Which iteration.
@@ -137,7 +140,9 @@ pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
     let (points, align_ms) = measure_align(&mut device, &config, args.iterations)?;
     let bytes = device.engine.allocated_bytes();
     drop(device);
-    let semantic = measure_semantic_path(&config, &args.engine, args.iterations, screen)?;
+    let semantic = (!args.no_baseline)
+        .then(|| measure_semantic_path(&config, &args.engine, args.iterations, screen))
+        .transpose()?;
 
     let mut text = format!(
         "{}\nbound {} x {} x {} m, three modalities of 16 channels, {CLASSES} classes, {} MiB of \
@@ -156,16 +161,46 @@ pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
     let _ = writeln!(
         text,
         "\na mapping call of {} iterations: {:.1} ms; {} fusion steps, the updates of the anchors \
-         and a maintenance add {:.1} %",
+         and a maintenance add {:.1} %, and {} dispatches to {}",
         modules.iterations,
         modules.call_ms,
         modules.fusion_steps,
-        100.0 * modules.ratio
+        100.0 * modules.ratio,
+        modules.dispatches[1],
+        modules.dispatches[0],
     );
     let _ = writeln!(
         text,
         "\ntracking (align), {points} points: {align_ms:.2} ms an iteration, with reading back"
     );
+    if let Some(semantic) = &semantic {
+        describe_semantic_path(&mut text, semantic);
+    }
+    let json = serde_json::json!({
+        "engine": chosen.record,
+        "iterations": args.iterations,
+        "device_bytes": bytes,
+        "tracking_render": tracking,
+        "mapping": mapping,
+        "modules": modules,
+        "semantic_path": semantic,
+        "tracking_align": { "points": points, "ms_an_iteration": align_ms },
+    });
+    screen.result(&text, &format!("{json:#}\n"));
+    Ok(())
+}
+
+fn describe(text: &mut String, name: &str, m: &Measured) {
+    let (rays, samples) = (m.rays, m.samples_a_ray);
+    let size = if rays > 0 { format!(", {rays} x {samples}") } else { String::new() };
+    let _ = writeln!(text, "\n{name}{size}: {:.2} ms an iteration", m.ms_an_iteration);
+    let sum: f64 = m.stages.iter().map(|s| s.ms).sum();
+    for s in &m.stages {
+        let _ = writeln!(text, "  {:22}{:9.2} ms {:5.1} %", s.kernel, s.ms, 100.0 * s.ms / sum);
+    }
+}
+
+fn describe_semantic_path(text: &mut String, semantic: &SemanticPath) {
     let _ = writeln!(
         text,
         "\nsemantic path, {} x {}, {CLASSES} classes: what classes add, median of {} rounds\n  \
@@ -189,28 +224,6 @@ pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
         format!("1 / {:.1}", 1.0 / semantic.ratio_to_class),
         format!("1 / {:.1}", 1.0 / semantic.ratio_training)
     );
-    let json = serde_json::json!({
-        "engine": chosen.record,
-        "iterations": args.iterations,
-        "device_bytes": bytes,
-        "tracking_render": tracking,
-        "mapping": mapping,
-        "modules": modules,
-        "semantic_path": semantic,
-        "tracking_align": { "points": points, "ms_an_iteration": align_ms },
-    });
-    screen.result(&text, &format!("{json:#}\n"));
-    Ok(())
-}
-
-fn describe(text: &mut String, name: &str, m: &Measured) {
-    let (rays, samples) = (m.rays, m.samples_a_ray);
-    let size = if rays > 0 { format!(", {rays} x {samples}") } else { String::new() };
-    let _ = writeln!(text, "\n{name}{size}: {:.2} ms an iteration", m.ms_an_iteration);
-    let sum: f64 = m.stages.iter().map(|s| s.ms).sum();
-    for s in &m.stages {
-        let _ = writeln!(text, "  {:22}{:9.2} ms {:5.1} %", s.kernel, s.ms, 100.0 * s.ms / sum);
-    }
 }
 
 fn set_up(engine: Engine, config: &Config, classes: u32) -> Result<Device> {
@@ -394,6 +407,7 @@ fn measure_modules(
     let stage = |m: &Measured, name: &str| -> f64 {
         m.stages.iter().filter(|s| s.kernel == name).map(|s| s.ms).sum()
     };
+    let dispatches = |m: &Measured| -> usize { m.stages.iter().map(|s| s.dispatches).sum() };
     let added = fusion.ms_an_iteration * f64::from(steps)
         + stage(&suppressor, "update_anchors") * f64::from(mapping_iterations)
         + stage(&suppressor, "maintain_anchors");
@@ -401,9 +415,13 @@ fn measure_modules(
         iterations: mapping_iterations,
         call_ms,
         fusion_steps: steps,
+        ratio: added / call_ms,
+        dispatches: [
+            dispatches(mapping) * mapping_iterations as usize,
+            dispatches(&fusion) * steps as usize + mapping_iterations as usize + 1,
+        ],
         fusion,
         suppressor,
-        ratio: added / call_ms,
     })
 }
 
