@@ -1,0 +1,209 @@
+//! Layers of the fusion, and which of them one dispatch runs side by side.
+use crate::{
+    config::FusionConfig,
+    engine::{Engine, EngineError},
+    kernels::{
+        token_layer::TOKEN_LAYER,
+        tokens::{
+            APPEARANCE_AT, COLOR_AT, DEPTHWISE_AT, FIRST_AT, FUSED_AT, GATE_AT, GEOMETRY_AT,
+            GEOMETRY_INPUTS, GUIDED_AT, HIDDEN, HIDDEN_AT, LOCAL_AT, LOGITS_AT, NO_BIAS,
+            PATCH_INPUTS, RAW_GEOMETRY, RAW_HISTOGRAM, RAW_PATCH, SECOND_AT, SEMANTIC_AT,
+            TokenLayer,
+        },
+    },
+    recording::{BufferId, Recording, workgroups_1d},
+};
+use alloc::{vec, vec::Vec};
+
+/// One layer of the fusion.
+#[derive(Clone, Copy, Debug)]
+pub struct Layer {
+    /// What it is called in the paper or the design.
+    pub name: &'static str,
+    /// What the kernels know of it; `weights` and `bias` are places in the parameter buffer.
+    pub shape: TokenLayer,
+    /// Outputs a row of weights has room for.
+    pub(super) room: u32,
+}
+
+impl Layer {
+    /// Number of weights.
+    pub fn weight_count(&self) -> u32 {
+        let l = &self.shape;
+        l.taps * l.taps * l.inputs * if l.depthwise == 1 { 1 } else { self.room }
+    }
+    /// Number of biases.
+    pub fn bias_count(&self) -> u32 {
+        if self.shape.bias == NO_BIAS { 0 } else { self.room }
+    }
+}
+
+/// Layers in the order of the forward pass, and the parameters that they take.
+pub(super) fn layers(classes: u32, channels: u32, config: &FusionConfig) -> (Vec<Layer>, u32) {
+    let mut at = 0;
+    let mut all = Vec::new();
+    let mut add =
+        |name, from_raw, input, inputs, output, outputs: u32, taps, kind: (bool, bool, bool)| {
+            let (depthwise, activation, biased) = kind;
+            // `token_loss` reads the colour head four columns wide; layers have no padding.
+            let room = if name == "colour head" { 4 } else { outputs };
+            let shape = TokenLayer {
+                from_raw: u32::from(from_raw),
+                input,
+                inputs,
+                output,
+                outputs,
+                taps,
+                depthwise: u32::from(depthwise),
+                activation: u32::from(activation),
+                weights: at,
+                bias: NO_BIAS,
+                input_stride: room,
+                output_stride: 1,
+            };
+            let mut layer = Layer { name, shape, room };
+            at += layer.weight_count();
+            if biased {
+                layer.shape.bias = at;
+                at += layer.bias_count();
+            }
+            all.push(layer);
+        };
+    let (plain, linear) = ((false, false, false), (false, false, true));
+    let local = config.local_kernel;
+    add(
+        "geometry hidden",
+        true,
+        RAW_GEOMETRY,
+        GEOMETRY_INPUTS,
+        HIDDEN_AT,
+        HIDDEN,
+        1,
+        (false, true, true),
+    );
+    add("geometry", false, HIDDEN_AT, HIDDEN, GEOMETRY_AT, 16, 1, linear);
+    if channels > 0 {
+        // Without bias: keys that all move alike change no softmax, so it would never learn.
+        add(FEATURE_LAYER, true, 0, channels, SEMANTIC_AT, 16, 1, plain);
+    } else {
+        add("class embedding", true, RAW_HISTOGRAM, classes, SEMANTIC_AT, 16, 1, plain);
+    }
+    add("patch embedding", true, RAW_PATCH, PATCH_INPUTS, APPEARANCE_AT, 16, 1, linear);
+    add("Q1", false, GEOMETRY_AT, 16, FIRST_AT, 16, 1, plain);
+    add("K1", false, SEMANTIC_AT, 16, FIRST_AT + 16, 16, 1, plain);
+    add("V1", false, APPEARANCE_AT, 16, FIRST_AT + 32, 16, 1, plain);
+    add("Q2", false, GUIDED_AT, 16, SECOND_AT, 16, 1, plain);
+    add("K2", false, APPEARANCE_AT, 16, SECOND_AT + 16, 16, 1, plain);
+    add("V2", false, APPEARANCE_AT, 16, SECOND_AT + 32, 16, 1, plain);
+    add("depthwise", false, GUIDED_AT, 16, DEPTHWISE_AT, 16, 3, (true, true, true));
+    let input = if config.local { DEPTHWISE_AT } else { GUIDED_AT };
+    add("pointwise", false, input, 16, LOCAL_AT, 16, local, (false, true, true));
+    add("gate", false, GEOMETRY_AT, 48, GATE_AT, 3, config.gate_kernel, linear);
+    add("colour head", false, FUSED_AT, 16, COLOR_AT, 3, 1, linear);
+    (all, at)
+}
+
+/// The layer that reads feature maps, which lie in a buffer of their own.
+const FEATURE_LAYER: &str = "feature projection";
+
+/// Layers side by side, by what they wait for: for raw inputs, their embeddings, the geometry, the
+/// first attention, the depthwise convolution, and both sides of the gate.
+const FORWARD: [&[&str]; 6] = [
+    &["geometry hidden", "class embedding", "patch embedding"],
+    &["geometry", "K1", "V1", "K2", "V2"],
+    &["Q1"],
+    &["Q2", "depthwise"],
+    &["pointwise"],
+    &["gate"],
+];
+/// The same backwards: no two of a group add to the same gradients. Behind the second come the
+/// gradients of the second attention, behind the fourth those of the first. The loss has already
+/// sent the colour head's on.
+const BACKWARD: [&[&str]; 6] = [
+    &["gate"],
+    &["pointwise"],
+    &["depthwise", "V2"],
+    &["Q2", "K2"],
+    &["V1", "K1", "Q1"],
+    &["geometry"],
+];
+
+/// Layers that one dispatch runs.
+pub(super) struct Group {
+    /// The first one's place in the table.
+    pub first: u32,
+    layers: Vec<TokenLayer>,
+}
+
+impl Group {
+    /// Workgroups for as many invocations as the layer with most has.
+    pub fn workgroups(&self, invocations: impl Fn(&TokenLayer) -> usize) -> [u32; 3] {
+        let most = self.layers.iter().map(invocations).max().unwrap_or(0);
+        let [x, y, _] = workgroups_1d(most, TOKEN_LAYER.workgroup_size);
+        [x, y, self.layers.len() as u32]
+    }
+}
+
+/// The dispatches of layers, and the table they find them in.
+pub(super) struct Schedule {
+    pub table: BufferId,
+    /// As [`FORWARD`].
+    pub forward: Vec<Group>,
+    /// As [`BACKWARD`].
+    pub backward: Vec<Group>,
+    /// All layers but the one of feature maps.
+    pub weights: Group,
+    /// That one.
+    pub features: Option<Group>,
+    /// The class head, which is shared with the field; its weights are stored output-major.
+    pub head: Group,
+}
+
+impl Schedule {
+    pub fn new(
+        e: &mut Engine,
+        layers: &[Layer],
+        classes: u32,
+        config: &FusionConfig,
+    ) -> Result<Schedule, EngineError> {
+        let mut table: Vec<TokenLayer> = Vec::new();
+        let mut group = |layers: Vec<TokenLayer>| {
+            let first = table.len() as u32;
+            table.extend(&layers);
+            Group { first, layers }
+        };
+        let used = |l: &&Layer| config.local || l.name != "depthwise";
+        let mut all = |groups: [&[&str]; 6]| {
+            let of = |names: &[&str]| {
+                let named = layers.iter().filter(used).filter(|l| names.contains(&l.name));
+                group(named.map(|l| l.shape).collect())
+            };
+            groups.map(of).into_iter().collect()
+        };
+        let (forward, backward) = (all(FORWARD), all(BACKWARD));
+        let (features, rest): (Vec<&Layer>, _) =
+            layers.iter().filter(used).partition(|l| l.name == FEATURE_LAYER);
+        let weights = group(rest.iter().map(|l| l.shape).collect());
+        let features = features.first().map(|l| group(vec![l.shape]));
+        let head = group(vec![TokenLayer {
+            from_raw: 0,
+            input: FUSED_AT,
+            inputs: 16,
+            output: LOGITS_AT,
+            outputs: classes,
+            taps: 1,
+            depthwise: 0,
+            activation: 0,
+            weights: 0,
+            bias: classes * 16,
+            input_stride: 1,
+            output_stride: 16,
+        }]);
+        let words: &[u32] = bytemuck::cast_slice(&table);
+        let buffer = e.create_buffer("token layers", words.len())?;
+        let mut r = Recording::default();
+        r.upload(buffer, 0, words);
+        e.submit(&r)?;
+        Ok(Schedule { table: buffer, forward, backward, weights, features, head })
+    }
+}
