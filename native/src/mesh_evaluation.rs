@@ -53,7 +53,10 @@ impl MeshTruth {
         if path.is_file() {
             return Ok(Ok(MeshTruth::read(&path)?));
         }
-        Ok(Err(format!("there is no true mesh ({}; --mesh names another)", path.display())))
+        Ok(
+            Err("there is no true mesh (mesh.ply in the recording; --mesh names another)"
+                .to_owned()),
+        )
     }
 }
 

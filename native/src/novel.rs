@@ -90,8 +90,8 @@ pub fn of_run(
         views.extend(pose.and_then(|pose| sequence.view_from(index, &pose)));
     }
     if views.is_empty() {
-        let reason = format!("there is no recording of other poses ({})", beside.display());
-        metrics.absent.insert("novel_views", reason);
+        let reason = "there is no recording of other poses (a folder `novel` in the recording)";
+        metrics.absent.insert("novel_views", reason.to_owned());
         return Ok(());
     }
     let info = sequence.info().clone();
