@@ -324,6 +324,26 @@ pub fn maintenance() -> Vec<(Case, [u32; 4])> {
             ),
             [5, 0, 0, 3],
         ),
+        // The first moves half way to the third: the second, which is close only now, was passed by, the
+        // fourth was not.
+        (
+            plain(
+                "merge in order",
+                vec![(0.0, class(0)), (0.16, class(0)), (0.11, class(0)), (0.17, class(0))],
+            ),
+            [2, 0, 0, 2],
+        ),
+        // As many as there may be, four in a place.
+        (
+            Maintenance {
+                slots: 256,
+                ..plain(
+                    "merge many",
+                    (0..256).map(|i| (0.5 * (i % 64) as f32, class(i % 64 % CLASSES))).collect(),
+                )
+            },
+            [64, 0, 0, 192],
+        ),
         // Every class's first anchor.
         (
             Maintenance { spawns: 7, spawn_distance: 1e6, ..plain("first anchors", vec![]) },
