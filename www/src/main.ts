@@ -38,6 +38,9 @@ const run = {
   /** When frames were done, for the time that is left. */
   begun: 0,
   begunAt: 0,
+  /** When it was asked for, and how long the first surface took from there [s]. */
+  askedAt: 0,
+  firstMap: undefined as number | undefined,
   id: "",
   /** Frames in the state that is kept of this run; 0 for none. */
   kept: 0,
@@ -90,7 +93,7 @@ async function open(source: SourceSpec, choice: state.Choice, id?: string, start
   const again = id !== undefined && id === run.id;
   run.source = source;
   run.choice = choice;
-  Object.assign(run, { opened: undefined, finished: false, frames: 0, done: 0, triangles: 0, lost: 0, begun: 0 });
+  Object.assign(run, { opened: undefined, finished: false, frames: 0, done: 0, triangles: 0, lost: 0, begun: 0, askedAt: performance.now(), firstMap: undefined });
   if (!again) Object.assign(run, { id: id ?? `${Date.now()}-${Math.random()}`, kept: 0, restoredAt: -1 });
   awaited = undefined;
   mine(run.id);
@@ -275,6 +278,7 @@ slam.on("pose", (event) => {
 slam.on("trajectory", (event) => view.send({ type: "path", positions: event.positions }));
 slam.on("map", (event) => {
   run.triangles = event.triangles;
+  if (event.triangles > 0) run.firstMap ??= (performance.now() - run.askedAt) / 1000;
   plots.add("triangles", event.triangles);
   view.chunks(event.chunks, event.bounds ?? null);
 });
@@ -299,7 +303,8 @@ slam.on("saved", (event) => {
 slam.on("done", (event) => {
   run.finished = true;
   const lost = event.lost > 0 ? `, ${event.lost} lost` : "";
-  status(`Done in ${seconds(event.seconds)}${lost}`);
+  const first = run.firstMap === undefined ? "" : `, first surface after ${run.firstMap.toFixed(1)} s`;
+  status(`Done in ${seconds(event.seconds)}${lost}${first}`);
   transport();
 });
 slam.on("error", (event: ErrorEvent) => failed(event.kind, event.message, event.resumable));

@@ -161,7 +161,9 @@ test("WebGPU in software: the device is lost in the middle, and the run goes on 
   // The frame at which it was lost is read a second time.
   assert.deepEqual(read.filter((i) => i >= kept).slice(-(4 - kept)), Array.from({ length: 4 - kept }, (_, i) => kept + i));
   const { triangles, covered } = await stats(page);
-  console.log(`# WebGPU on a software adapter: 4 frames on two devices in ${((Date.now() - begun) / 1000).toFixed(0)} s, ${triangles} triangles`);
+  const first = await page.evaluate(() => window.mteSlam.run.firstMap);
+  assert.ok(first > 0, `${first} s`);
+  console.log(`# WebGPU on a software adapter: first surface after ${first.toFixed(1)} s, 4 frames on two devices in ${((Date.now() - begun) / 1000).toFixed(0)} s, ${triangles} triangles`);
   assert.match(await page.locator("#engine").textContent(), /^GPU/);
   assert.ok(triangles > 50 && covered > 0.01, `${triangles} triangles, ${covered} covered`);
   await page.close();
