@@ -290,7 +290,7 @@ impl Device {
         for (i, group) in f.schedule.forward.iter().enumerate() {
             f.record_layers(r, group, f.raw, p);
             match i {
-                2 => record_attention(r, f, &ATTEND_TOKENS, &first(f, p), n),
+                2 => record_attention(r, f, &ATTEND_TOKENS, &first(p), n),
                 4 => record_attention(r, f, &ATTEND_TOKENS, &second(f, p), n),
                 _ => {}
             }
@@ -324,7 +324,7 @@ impl Device {
         for (i, group) in f.schedule.backward.iter().enumerate() {
             match i {
                 2 => record_attention_backward(r, f, &second(f, p)),
-                4 => record_attention_backward(r, f, &first(f, p)),
+                4 => record_attention_backward(r, f, &first(p)),
                 _ => {}
             }
             r.dispatch(
@@ -393,7 +393,7 @@ impl Device {
 }
 
 /// Geometry asks semantics for appearance (paper eqs. 1, 2).
-fn first(_: &Fusion, p: TokenParams) -> TokenParams {
+fn first(p: TokenParams) -> TokenParams {
     TokenParams { query: FIRST_AT, output: GUIDED_AT, statistics: STATISTICS_AT, ..p }
 }
 
