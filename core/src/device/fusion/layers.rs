@@ -207,3 +207,56 @@ impl Schedule {
         Ok(Schedule { table: buffer, forward, backward, weights, features, head })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A misspelt name would leave a layer out, two in one place would race.
+    #[test]
+    fn every_layer_is_in_one_group_and_none_in_the_way_of_another() {
+        for (channels, local) in [(0, true), (11, true), (0, false)] {
+            let config = FusionConfig { local, ..FusionConfig::default() };
+            let mut e = Engine::cpu();
+            let (all, _) = layers(5, channels, &config);
+            let s = Schedule::new(&mut e, &all, 5, &config).unwrap();
+            let weights = |groups: &[Group]| -> Vec<u32> {
+                let mut found: Vec<u32> =
+                    groups.iter().flat_map(|g| &g.layers).map(|l| l.weights).collect();
+                found.sort_unstable();
+                found
+            };
+            let of = |kept: &dyn Fn(&Layer) -> bool| -> Vec<u32> {
+                let used = |l: &&Layer| local || l.name != "depthwise";
+                all.iter().filter(used).filter(|l| kept(l)).map(|l| l.shape.weights).collect()
+            };
+            let own_buffer = |l: &Layer| l.name == FEATURE_LAYER;
+            let read_by_loss = |l: &Layer| l.name == "colour head";
+            assert_eq!(weights(&s.forward), of(&|l| !own_buffer(l) && !read_by_loss(l)));
+            assert_eq!(weights(&s.backward), of(&|l| l.shape.from_raw == 0 && !read_by_loss(l)));
+            assert_eq!(weights(&[s.weights]), of(&|l| !own_buffer(l)));
+            assert_eq!(s.features.is_some(), channels > 0);
+            let apart = |a: (u32, u32), b: (u32, u32)| a.1 <= b.0 || b.1 <= a.0;
+            for group in &s.forward {
+                for (i, a) in group.layers.iter().enumerate() {
+                    for (_, b) in group.layers.iter().enumerate().filter(|(k, _)| *k != i) {
+                        let read = if b.from_raw == 1 { 0 } else { b.inputs };
+                        let written = (a.output, a.output + a.outputs);
+                        assert!(apart(written, (b.output, b.output + b.outputs)));
+                        assert!(apart(written, (b.input, b.input + read)) || read == 0);
+                    }
+                }
+            }
+            for group in &s.backward {
+                for (i, a) in group.layers.iter().enumerate() {
+                    for b in &group.layers[i + 1..] {
+                        assert!(apart(
+                            (a.input, a.input + a.inputs),
+                            (b.input, b.input + b.inputs)
+                        ));
+                    }
+                }
+            }
+        }
+    }
+}
