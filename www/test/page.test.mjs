@@ -27,9 +27,9 @@ test("a first visit: start the built-in room, watch it grow, use everything", { 
   assert.ok(later.t > early.t || early.t > 500, `the mesh does not grow: ${early.t}, ${later.t}`);
   assert.ok(later.n > early.n, "the plots do not move");
   assert.match(await page.locator("#plot-ate .value").textContent(), /^\d+\.\d\d/);
-  const first = await page.evaluate(() => window.mteSlam.run.firstMap);
-  console.log(`# first surface ${first.toFixed(1)} s after the start (processor, 64 x 48 pixels)`);
-  assert.ok(first > 0 && first < 60, `${first} s`);
+  const firstMap = await page.evaluate(() => window.mteSlam.run.firstMap);
+  console.log(`# first surface ${firstMap.toFixed(1)} s after the start (processor, 64 x 48 pixels)`);
+  assert.ok(firstMap > 0 && firstMap < 60, `${firstMap} s`);
 
   // Images on both sides.
   for (const id of ["in-color", "in-depth", "in-classes", "out-color", "out-depth", "out-classes"]) {

@@ -249,11 +249,10 @@ mod tests {
             }
             for group in &s.backward {
                 for (i, a) in group.layers.iter().enumerate() {
-                    for b in &group.layers[i + 1..] {
-                        assert!(apart(
-                            (a.input, a.input + a.inputs),
-                            (b.input, b.input + b.inputs)
-                        ));
+                    let added = (a.input, a.input + a.inputs);
+                    for (_, b) in group.layers.iter().enumerate().filter(|(k, _)| *k != i) {
+                        assert!(apart(added, (b.input, b.input + b.inputs)));
+                        assert!(apart(added, (b.output, b.output + b.outputs)));
                     }
                 }
             }
