@@ -229,12 +229,7 @@ fn layers() -> Vec<(&'static str, TokenLayer)> {
         output_stride: 1,
         ..TokenLayer::default()
     };
-    let bias = |l: TokenLayer| TokenLayer {
-        bias: l.weights
-            + l.taps * l.taps * l.inputs * if l.depthwise == 1 { 1 } else { l.outputs }
-            + 2,
-        ..l
-    };
+    let bias = |l: TokenLayer| TokenLayer { bias: l.weights + l.weight_count() + 2, ..l };
     let rectified = |l| TokenLayer { activation: 1, ..l };
     let wide = |l| TokenLayer { taps: 3, ..l };
     let depthwise = |l| TokenLayer { depthwise: 1, taps: 3, ..l };
@@ -261,9 +256,8 @@ fn side_by_side(names: &[&str]) -> Vec<TokenLayer> {
         .iter()
         .map(|name| {
             let (_, mut l) = *all.iter().find(|(n, _)| n == name).expect("a layer's name");
-            let weights = l.taps * l.taps * l.inputs * if l.depthwise == 1 { 1 } else { l.outputs };
             l.weights = at;
-            at += weights + 1;
+            at += l.weight_count() + 1;
             if l.bias != NO_BIAS {
                 l.bias = at;
                 at += l.outputs;

@@ -76,12 +76,12 @@ fn device_with(engine: Engine, fusion: FusionConfig, channels: u32) -> Device {
     for layer in &layers {
         if layer.shape.bias != NO_BIAS {
             let biases =
-                layer.shape.bias as usize..(layer.shape.bias + layer.bias_count()) as usize;
+                layer.shape.bias as usize..(layer.shape.bias + layer.shape.bias_count()) as usize;
             values[biases].fill_with(|| random.uniform(-0.2, 0.2));
         }
         if layer.name.starts_with(['Q', 'K']) {
-            let weights =
-                layer.shape.weights as usize..(layer.shape.weights + layer.weight_count()) as usize;
+            let weights = layer.shape.weights as usize
+                ..(layer.shape.weights + layer.shape.weight_count()) as usize;
             values[weights].iter_mut().for_each(|w| *w *= 2.0);
         }
     }
@@ -188,8 +188,8 @@ fn fusion_gradients(fusion: FusionConfig) {
     assert_eq!((f.columns, f.rows), (13, 7));
     let gradient = read(&mut d, tensor.gradient, tensor.floats);
     for layer in layers {
-        let weights =
-            layer.shape.weights as usize..(layer.shape.weights + layer.weight_count()) as usize;
+        let weights = layer.shape.weights as usize
+            ..(layer.shape.weights + layer.shape.weight_count()) as usize;
         if layer.name == "depthwise" && !local {
             assert!(gradient[weights].iter().all(|g| *g == 0.0), "nothing reads it");
             continue;
@@ -197,7 +197,7 @@ fn fusion_gradients(fusion: FusionConfig) {
         check(&mut d, tensor.values, &gradient, weights, layer.name, &mut fusion_loss);
         if layer.shape.bias != NO_BIAS {
             let biases =
-                layer.shape.bias as usize..(layer.shape.bias + layer.bias_count()) as usize;
+                layer.shape.bias as usize..(layer.shape.bias + layer.shape.bias_count()) as usize;
             let name = format!("{}, biases", layer.name);
             check(&mut d, tensor.values, &gradient, biases, &name, &mut fusion_loss);
         }
@@ -226,7 +226,7 @@ fn gradients_of_the_projection_of_feature_maps() {
     let layer = *f.layers.iter().find(|l| l.name == "feature projection").unwrap();
     let gradient = read(&mut d, tensor.gradient, tensor.floats);
     let weights =
-        layer.shape.weights as usize..(layer.shape.weights + layer.weight_count()) as usize;
+        layer.shape.weights as usize..(layer.shape.weights + layer.shape.weight_count()) as usize;
     check(&mut d, tensor.values, &gradient, weights, layer.name, &mut fusion_loss);
 }
 

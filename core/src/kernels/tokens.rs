@@ -157,6 +157,19 @@ params! {
 }
 
 impl TokenLayer {
+    /// Number of weights, which are stored input-major.
+    pub fn weight_count(&self) -> u32 {
+        self.taps
+            * self.taps
+            * self.inputs
+            * if self.depthwise == 1 { 1 } else { self.input_stride }
+    }
+
+    /// Number of biases, with padding as weights have it.
+    pub fn bias_count(&self) -> u32 {
+        if self.bias == NO_BIAS { 0 } else { self.input_stride }
+    }
+
     /// Fours of outputs.
     pub fn quads(&self) -> usize {
         self.outputs.div_ceil(4) as usize

@@ -22,19 +22,12 @@ pub struct Layer {
     pub name: &'static str,
     /// What the kernels know of it; `weights` and `bias` are places in the parameter buffer.
     pub shape: TokenLayer,
-    /// Outputs a row of weights has room for.
-    pub(super) room: u32,
 }
 
 impl Layer {
-    /// Number of weights.
-    pub fn weight_count(&self) -> u32 {
-        let l = &self.shape;
-        l.taps * l.taps * l.inputs * if l.depthwise == 1 { 1 } else { self.room }
-    }
-    /// Number of biases.
-    pub fn bias_count(&self) -> u32 {
-        if self.shape.bias == NO_BIAS { 0 } else { self.room }
+    /// Whether the configuration runs it; its parameters are there in any case.
+    pub(super) fn used(&self, config: &FusionConfig) -> bool {
+        config.local || self.name != "depthwise"
     }
 }
 
@@ -46,8 +39,8 @@ pub(super) fn layers(classes: u32, channels: u32, config: &FusionConfig) -> (Vec
         |name, from_raw, input, inputs, output, outputs: u32, taps, kind: (bool, bool, bool)| {
             let (depthwise, activation, biased) = kind;
             // `token_loss` reads the colour head four columns wide; layers have no padding.
-            let room = if name == "colour head" { 4 } else { outputs };
-            let shape = TokenLayer {
+            let input_stride = if name == "colour head" { 4 } else { outputs };
+            let mut shape = TokenLayer {
                 from_raw: u32::from(from_raw),
                 input,
                 inputs,
@@ -58,16 +51,15 @@ pub(super) fn layers(classes: u32, channels: u32, config: &FusionConfig) -> (Vec
                 activation: u32::from(activation),
                 weights: at,
                 bias: NO_BIAS,
-                input_stride: room,
+                input_stride,
                 output_stride: 1,
             };
-            let mut layer = Layer { name, shape, room };
-            at += layer.weight_count();
+            at += shape.weight_count();
             if biased {
-                layer.shape.bias = at;
-                at += layer.bias_count();
+                shape.bias = at;
+                at += shape.bias_count();
             }
-            all.push(layer);
+            all.push(Layer { name, shape });
         };
     let (plain, linear) = ((false, false, false), (false, false, true));
     let local = config.local_kernel;
@@ -106,26 +98,38 @@ pub(super) fn layers(classes: u32, channels: u32, config: &FusionConfig) -> (Vec
 /// The layer that reads feature maps, which lie in a buffer of their own.
 const FEATURE_LAYER: &str = "feature projection";
 
-/// Layers side by side, by what they wait for: for raw inputs, their embeddings, the geometry, the
-/// first attention, the depthwise convolution, and both sides of the gate.
-const FORWARD: [&[&str]; 6] = [
-    &["geometry hidden", "class embedding", "patch embedding"],
-    &["geometry", "K1", "V1", "K2", "V2"],
-    &["Q1"],
-    &["Q2", "depthwise"],
-    &["pointwise"],
-    &["gate"],
+/// A step of a pass over a frame's tokens.
+pub(super) enum Step<L> {
+    /// Layers side by side.
+    Layers(L),
+    /// Geometry asks semantics for appearance (paper eqs. 1, 2).
+    FirstAttention,
+    /// Guided semantics ask appearance (paper eqs. 3, 4).
+    SecondAttention,
+}
+
+/// The forward pass: no layer of a step reads what another one writes.
+const FORWARD: [Step<&[&str]>; 8] = [
+    Step::Layers(&["geometry hidden", "class embedding", "patch embedding"]),
+    Step::Layers(&["geometry", "K1", "V1", "K2", "V2"]),
+    Step::Layers(&["Q1"]),
+    Step::FirstAttention,
+    Step::Layers(&["Q2", "depthwise"]),
+    Step::Layers(&["pointwise"]),
+    Step::SecondAttention,
+    Step::Layers(&["gate"]),
 ];
-/// The same backwards: no two of a group add to the same gradients. Behind the second come the
-/// gradients of the second attention, behind the fourth those of the first. The loss has already
-/// sent the colour head's on.
-const BACKWARD: [&[&str]; 6] = [
-    &["gate"],
-    &["pointwise"],
-    &["depthwise", "V2"],
-    &["Q2", "K2"],
-    &["V1", "K1", "Q1"],
-    &["geometry"],
+/// The backward pass: no layer of a step adds to gradients that another one reads or adds to. The
+/// loss has already sent the colour head's on.
+const BACKWARD: [Step<&[&str]>; 8] = [
+    Step::Layers(&["gate"]),
+    Step::Layers(&["pointwise"]),
+    Step::SecondAttention,
+    Step::Layers(&["depthwise", "V2"]),
+    Step::Layers(&["Q2", "K2"]),
+    Step::FirstAttention,
+    Step::Layers(&["V1", "K1", "Q1"]),
+    Step::Layers(&["geometry"]),
 ];
 
 /// Layers that one dispatch runs.
@@ -148,9 +152,9 @@ impl Group {
 pub(super) struct Schedule {
     pub table: BufferId,
     /// As [`FORWARD`].
-    pub forward: Vec<Group>,
+    pub forward: Vec<Step<Group>>,
     /// As [`BACKWARD`].
-    pub backward: Vec<Group>,
+    pub backward: Vec<Step<Group>>,
     /// All layers but the one of feature maps.
     pub weights: Group,
     /// That one.
@@ -172,32 +176,32 @@ impl Schedule {
             table.extend(&layers);
             Group { first, layers }
         };
-        let used = |l: &&Layer| config.local || l.name != "depthwise";
-        let mut all = |groups: [&[&str]; 6]| {
-            let of = |names: &[&str]| {
-                let named = layers.iter().filter(used).filter(|l| names.contains(&l.name));
-                group(named.map(|l| l.shape).collect())
+        let used: Vec<&Layer> = layers.iter().filter(|l| l.used(config)).collect();
+        let mut all = |steps: [Step<&[&str]>; 8]| {
+            let of = |step: Step<&[&str]>| match step {
+                Step::Layers(names) => {
+                    let named = used.iter().filter(|l| names.contains(&l.name));
+                    Step::Layers(group(named.map(|l| l.shape).collect()))
+                }
+                Step::FirstAttention => Step::FirstAttention,
+                Step::SecondAttention => Step::SecondAttention,
             };
-            groups.map(of).into_iter().collect()
+            steps.map(of).into_iter().collect()
         };
         let (forward, backward) = (all(FORWARD), all(BACKWARD));
-        let (features, rest): (Vec<&Layer>, _) =
-            layers.iter().filter(used).partition(|l| l.name == FEATURE_LAYER);
+        let (features, rest): (Vec<&Layer>, _) = used.iter().partition(|l| l.name == FEATURE_LAYER);
         let weights = group(rest.iter().map(|l| l.shape).collect());
         let features = features.first().map(|l| group(vec![l.shape]));
         let head = group(vec![TokenLayer {
-            from_raw: 0,
             input: FUSED_AT,
             inputs: 16,
             output: LOGITS_AT,
             outputs: classes,
             taps: 1,
-            depthwise: 0,
-            activation: 0,
-            weights: 0,
             bias: classes * 16,
             input_stride: 1,
             output_stride: 16,
+            ..TokenLayer::default()
         }]);
         let words: &[u32] = bytemuck::cast_slice(&table);
         let buffer = e.create_buffer("token layers", words.len())?;
@@ -220,6 +224,11 @@ mod tests {
             let mut e = Engine::cpu();
             let (all, _) = layers(5, channels, &config);
             let s = Schedule::new(&mut e, &all, 5, &config).unwrap();
+            let groups = |steps: Vec<Step<Group>>| -> Vec<Group> {
+                let group = |step| if let Step::Layers(group) = step { Some(group) } else { None };
+                steps.into_iter().filter_map(group).collect()
+            };
+            let (forward, backward) = (groups(s.forward), groups(s.backward));
             let weights = |groups: &[Group]| -> Vec<u32> {
                 let mut found: Vec<u32> =
                     groups.iter().flat_map(|g| &g.layers).map(|l| l.weights).collect();
@@ -227,35 +236,43 @@ mod tests {
                 found
             };
             let of = |kept: &dyn Fn(&Layer) -> bool| -> Vec<u32> {
-                let used = |l: &&Layer| local || l.name != "depthwise";
-                all.iter().filter(used).filter(|l| kept(l)).map(|l| l.shape.weights).collect()
+                let used = all.iter().filter(|l| l.used(&config) && kept(l));
+                used.map(|l| l.shape.weights).collect()
             };
             let own_buffer = |l: &Layer| l.name == FEATURE_LAYER;
             let read_by_loss = |l: &Layer| l.name == "colour head";
-            assert_eq!(weights(&s.forward), of(&|l| !own_buffer(l) && !read_by_loss(l)));
-            assert_eq!(weights(&s.backward), of(&|l| l.shape.from_raw == 0 && !read_by_loss(l)));
+            assert_eq!(weights(&forward), of(&|l| !own_buffer(l) && !read_by_loss(l)));
+            assert_eq!(weights(&backward), of(&|l| l.shape.from_raw == 0 && !read_by_loss(l)));
             assert_eq!(weights(&[s.weights]), of(&|l| !own_buffer(l)));
             assert_eq!(s.features.is_some(), channels > 0);
-            let apart = |a: (u32, u32), b: (u32, u32)| a.1 <= b.0 || b.1 <= a.0;
-            for group in &s.forward {
-                for (i, a) in group.layers.iter().enumerate() {
-                    for (_, b) in group.layers.iter().enumerate().filter(|(k, _)| *k != i) {
-                        let read = if b.from_raw == 1 { 0 } else { b.inputs };
-                        let written = (a.output, a.output + a.outputs);
-                        assert!(apart(written, (b.output, b.output + b.outputs)));
-                        assert!(apart(written, (b.input, b.input + read)) || read == 0);
-                    }
-                }
+            for (a, b) in forward.iter().flat_map(others) {
+                assert!(apart(outputs(&a), outputs(&b)));
+                assert!(b.from_raw == 1 || apart(outputs(&a), inputs(&b)));
             }
-            for group in &s.backward {
-                for (i, a) in group.layers.iter().enumerate() {
-                    let added = (a.input, a.input + a.inputs);
-                    for (_, b) in group.layers.iter().enumerate().filter(|(k, _)| *k != i) {
-                        assert!(apart(added, (b.input, b.input + b.inputs)));
-                        assert!(apart(added, (b.output, b.output + b.outputs)));
-                    }
-                }
+            for (a, b) in backward.iter().flat_map(others) {
+                assert!(apart(inputs(&a), inputs(&b)));
+                assert!(apart(inputs(&a), outputs(&b)));
             }
         }
+    }
+
+    fn inputs(l: &TokenLayer) -> [u32; 2] {
+        [l.input, l.input + l.inputs]
+    }
+
+    fn outputs(l: &TokenLayer) -> [u32; 2] {
+        [l.output, l.output + l.outputs]
+    }
+
+    /// Whether two ranges of columns have none in common.
+    fn apart(a: [u32; 2], b: [u32; 2]) -> bool {
+        a[1] <= b[0] || b[1] <= a[0]
+    }
+
+    /// Each layer of a group with each other one.
+    fn others(group: &Group) -> Vec<(TokenLayer, TokenLayer)> {
+        let all = || group.layers.iter().copied().enumerate();
+        let pairs = all().flat_map(|a| all().map(move |b| (a, b)));
+        pairs.filter(|((i, _), (k, _))| i != k).map(|((_, a), (_, b))| (a, b)).collect()
     }
 }

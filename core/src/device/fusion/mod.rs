@@ -11,7 +11,6 @@ use crate::{
     engine::{Engine, EngineError},
     frame::FeatureMap,
     kernels::{
-        Kernel,
         adam::{self, AdamParams},
         attend_keys::ATTEND_KEYS,
         attend_queries::ATTEND_QUERIES,
@@ -35,7 +34,7 @@ use crate::{
     recording::{BufferId, Recording},
 };
 use alloc::{vec, vec::Vec};
-use layers::{Group, Schedule, layers};
+use layers::{Group, Schedule, Step, layers};
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
@@ -124,8 +123,9 @@ impl Fusion {
             };
             let gain = if layer.name == "gate" { 0.3 } else { 1.4 };
             let limit = gain * (3.0 / inputs as f32).sqrt();
-            for i in l.weights..l.weights + layer.weight_count() {
-                let unused = layer.room > l.outputs && (i - l.weights) % layer.room >= l.outputs;
+            for i in l.weights..l.weights + l.weight_count() {
+                let unused =
+                    l.input_stride > l.outputs && (i - l.weights) % l.input_stride >= l.outputs;
                 if !unused {
                     w[i as usize] = (2.0 * random_f32(seed, 0x1720, i, 9) - 1.0) * limit;
                 }
@@ -139,7 +139,7 @@ impl Fusion {
 
     /// Parameters that training moves: no padding, nor layers that the configuration leaves out.
     pub fn trained_count(&self) -> usize {
-        let used = self.layers.iter().filter(|l| self.config.local || l.name != "depthwise");
+        let used = self.layers.iter().filter(|l| l.used(&self.config));
         used.map(|layer| {
             let l = &layer.shape;
             let outputs = if l.depthwise == 1 { 1 } else { l.outputs };
@@ -287,12 +287,11 @@ impl Device {
         if let Some(group) = &f.schedule.features {
             f.record_layers(r, group, f.maps.buffer, f.feature_inputs(p));
         }
-        for (i, group) in f.schedule.forward.iter().enumerate() {
-            f.record_layers(r, group, f.raw, p);
-            match i {
-                2 => record_attention(r, f, &ATTEND_TOKENS, &first(p), n),
-                4 => record_attention(r, f, &ATTEND_TOKENS, &second(f, p), n),
-                _ => {}
+        for step in &f.schedule.forward {
+            match step {
+                Step::Layers(group) => f.record_layers(r, group, f.raw, p),
+                Step::FirstAttention => record_attention(r, f, &first(p)),
+                Step::SecondAttention => record_attention(r, f, &second(f, p)),
             }
         }
         r.dispatch_1d(&GATE_TOKENS, &p, &[f.tokens], n);
@@ -321,18 +320,17 @@ impl Device {
         r.clear(f.token_gradient, 0, n * f.stride as usize);
         self.record_fusion(r, slot, true);
         r.dispatch_1d(&GATE_BACKWARD, &p, &[f.tokens, f.token_gradient], n);
-        for (i, group) in f.schedule.backward.iter().enumerate() {
-            match i {
-                2 => record_attention_backward(r, f, &second(f, p)),
-                4 => record_attention_backward(r, f, &first(p)),
-                _ => {}
+        for step in &f.schedule.backward {
+            match step {
+                Step::Layers(group) => r.dispatch(
+                    &TOKEN_LAYER_BACKWARD,
+                    &TokenParams { layer: group.first, ..p },
+                    &[f.schedule.table, f.parameters.values, f.tokens, f.token_gradient],
+                    group.workgroups(|l| n * l.inputs as usize),
+                ),
+                Step::FirstAttention => record_attention_backward(r, f, &first(p)),
+                Step::SecondAttention => record_attention_backward(r, f, &second(f, p)),
             }
-            r.dispatch(
-                &TOKEN_LAYER_BACKWARD,
-                &TokenParams { layer: group.first, ..p },
-                &[f.schedule.table, f.parameters.values, f.tokens, f.token_gradient],
-                group.workgroups(|l| n * l.inputs as usize),
-            );
         }
         f.record_weights(r, &f.schedule.weights, [f.raw, f.partials], p);
         if let Some(group) = &f.schedule.features {
@@ -409,14 +407,8 @@ fn second(f: &Fusion, p: TokenParams) -> TokenParams {
     }
 }
 
-fn record_attention(
-    r: &mut Recording,
-    f: &Fusion,
-    kernel: &'static Kernel,
-    p: &TokenParams,
-    n: usize,
-) {
-    r.dispatch(kernel, p, &[f.tokens], [n.div_ceil(TILE) as u32, 1, 1]);
+fn record_attention(r: &mut Recording, f: &Fusion, p: &TokenParams) {
+    r.dispatch(&ATTEND_TOKENS, p, &[f.tokens], [f.count().div_ceil(TILE) as u32, 1, 1]);
 }
 
 fn record_attention_backward(r: &mut Recording, f: &Fusion, p: &TokenParams) {
