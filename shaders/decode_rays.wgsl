@@ -15,8 +15,8 @@
 @group(0) @binding(6) var<storage, read> anchors: array<vec4f>;
 // Per slot and token: fused feature (4) | weight, largest logit.
 @group(0) @binding(7) var<storage, read> targets: array<vec4f>;
-// Weight of each class in the cross-entropy.
-@group(0) @binding(8) var<storage, read> class_weights: array<f32>;
+// Of each class: weight in the cross-entropy, adjustment of its logit there.
+@group(0) @binding(8) var<storage, read> class_weights: array<vec2f>;
 
 #import shared/surface.wgsl
 
@@ -77,15 +77,22 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
         let label = ray_class(r);
         var hs = semantic_hidden(f);
         var feature = semantic_output(hs);
+        // The cross-entropy sees logits that favour classes as the weights do, so that the logits themselves, and the
+        // classes by them, do not.
+        var best_logit = -1e30;
         var best = -1e30;
         var sum = 0.0;
         var own = 0.0;
         for (var c = 0u; c < params.classes; c++) {
-            let logit = class_logit(feature, c);
+            let plain = class_logit(feature, c);
+            if (plain > best_logit) {
+                best_logit = plain;
+                best_class = c;
+            }
+            let logit = plain + class_weights[c].y;
             if (logit > best) {
                 sum = sum * exp(best - logit) + 1.0;
                 best = logit;
-                best_class = c;
             } else {
                 sum += exp(logit - best);
             }
@@ -148,12 +155,12 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
                 doubt = select(weight * (1.0 - fits), doubt * (1.0 - weight * fits), by_anchors);
             }
             trust = 1.0 - doubt;
-            class_weight = class_weights[label] * trust;
+            class_weight = class_weights[label].x * trust;
             loss_semantic = class_weight * (log(sum) + best - own);
         }
         let scale = class_weight * params.weight_semantic * inv_rays;
         for (var c = 0u; c < params.classes; c++) {
-            let p = exp(class_logit(feature, c) - best) / sum;
+            let p = exp(class_logit(feature, c) + class_weights[c].y - best) / sum;
             let g = scale * (p - select(0.0, 1.0, c == label));
             logits_gradient[ray * params.classes + c] = g;
 #for j in 0..4

@@ -14,7 +14,8 @@ struct Params {
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> rays: array<Ray>;
 @group(0) @binding(2) var<storage, read> slot_weights: array<f32>;
-@group(0) @binding(3) var<storage, read> class_weights: array<f32>;
+// Of each class: weight in the cross-entropy, adjustment of its logit there.
+@group(0) @binding(3) var<storage, read> class_weights: array<vec2f>;
 // C floats a slot, from the part's first ray on.
 @group(0) @binding(4) var<storage, read_write> logits: array<f32>;
 // Only the class and the semantic loss of a ray are written.
@@ -44,15 +45,20 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     let masked = (rays[ray].frame & 0x80000000u) != 0u;
     let label = ray_class(rays[ray]);
     if (lane == 0u) {
+        var best_logit = -1e30;
         var best = -1e30;
         var best_class = 255u;
         var sum = 0.0;
         for (var c = 0u; c < params.classes; c++) {
-            let v = composited[c];
+            if (composited[c] > best_logit) {
+                best_logit = composited[c];
+                best_class = c;
+            }
+            let v = composited[c] + class_weights[c].y;
+            composited[c] = v;
             if (v > best) {
                 sum = sum * exp(best - v) + 1.0;
                 best = v;
-                best_class = c;
             } else {
                 sum += exp(v - best);
             }
@@ -60,7 +66,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
         var loss = 0.0;
         var scale = 0.0;
         if (label < params.classes && !masked) {
-            let weight = class_weights[label];
+            let weight = class_weights[label].x;
             loss = weight * (log(sum) + best - composited[label]);
             scale = weight * params.weight_semantic / f32(params.batch_rays);
         }

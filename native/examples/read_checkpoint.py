@@ -16,8 +16,8 @@ from safetensors import safe_open
 def main(path, trajectory=None):
     with safe_open(path, framework="numpy") as f:
         metadata = f.metadata()
-        if metadata["format"] != "mte-slam-4":
-            sys.exit(f"{path}: format: found {metadata['format']}, expected mte-slam-4")
+        if metadata["format"] != "mte-slam-5":
+            sys.exit(f"{path}: format: found {metadata['format']}, expected mte-slam-5")
         tensors = {name: f.get_tensor(name) for name in f.keys()}
     state = json.loads(metadata["state"])
     print("configuration", metadata["configuration"], "data", metadata["data"])

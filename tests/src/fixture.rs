@@ -276,7 +276,8 @@ impl State {
         zero("gradient_appearance", shape.surface_floats());
         zero("gradient_semantic", shape.surface_floats());
         zero("status", 4);
-        b.insert("class_weights", f32_words([1.0, 0.5, 2.0, 1.5, 0.75]));
+        let weights = [1.0, 0.3, 0.5, -0.2, 2.0, 0.6, 1.5, 0.0, 0.75, -0.4];
+        b.insert("class_weights", f32_words(weights));
         b.insert("class_rarity", f32_words([0.1, 0.5, 2.0, 0.3, 0.3]));
         let mut zero = |name, words| b.insert(name, vec![0; words]);
         // Neither anchors nor fused features.

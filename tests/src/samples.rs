@@ -166,7 +166,8 @@ fn logits(name: &'static str, train: bool, classes: u32, slots: u32, first_ray: 
     let buffers = vec![
         state.buffers["rays"].clone(),
         floats(all * slots, 0.0, 2.0 / slots as f32),
-        floats(classes, 0.5, 2.0),
+        // Weights above 0, adjustments of either sign.
+        (0..classes).flat_map(|_| [floats(1, 0.5, 2.0)[0], floats(1, -1.0, 1.0)[0]]).collect(),
         floats(rays * slots * classes, -3.0, 3.0),
         vec![0; all as usize * RAY_OUT_FLOATS],
     ];

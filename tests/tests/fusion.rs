@@ -3,7 +3,7 @@
 //! settings that are refused.
 use mte_slam_core::{
     config::{Config, FusionConfig, LossConfig},
-    device::{Batch, Device, Guidance, Rates},
+    device::{Batch, ClassWeight, Device, Guidance, Rates},
     engine::Engine,
     frame::{FeatureMap, Frame},
     kernels::{
@@ -67,7 +67,9 @@ fn device_with(engine: Engine, fusion: FusionConfig, channels: u32) -> Device {
         d.upload_pose(&mut r, slot, &fixture::pose(slot));
     }
     d.upload_window(&mut r, &[(2, true), (0, true), (1, true)]);
-    d.upload_class_weights(&mut r, &[1.0; 5], &[1.0, 0.5, 2.0, 1.5, 0.75], &[0.0; 5]);
+    let weights = [(1.0, 0.3), (0.5, -0.2), (2.0, 0.6), (1.5, 0.0), (0.75, -0.4)]
+        .map(|(weight, adjustment)| ClassWeight { weight, adjustment });
+    d.upload_class_weights(&mut r, &weights, &[1.0, 0.5, 2.0, 1.5, 0.75], &[0.0; 5]);
     d.engine.submit(&r).unwrap();
     let f = d.fusion.as_ref().unwrap();
     let (tensor, layers) = (f.parameters, f.layers.clone());
@@ -298,6 +300,7 @@ const NO_LOSS: LossConfig = LossConfig {
     color: 0.0,
     semantic: 0.0,
     balance: 0.0,
+    adjustment: 0.0,
 };
 
 fn batch(compression: f64, feature: f64) -> Batch<'static> {

@@ -179,6 +179,7 @@ fn losses() -> LossConfig {
         color: 5.0,
         semantic: 1.0,
         balance: 0.0,
+        adjustment: 0.0,
     }
 }
 
@@ -342,6 +343,7 @@ fn semantic_gradients_stop_at_the_weights() {
         color: 0.0,
         semantic: 1.0,
         balance: 0.0,
+        adjustment: 0.0,
     };
     let mut problem = Problem::new(Engine::cpu(), only);
     let [geometry, appearance, semantic, decoders] = problem.gradients();

@@ -70,6 +70,7 @@ impl Config {
             not_negative("loss.color", l.color)?;
             not_negative("loss.semantic", l.semantic)?;
             not_negative("loss.balance", l.balance)?;
+            not_negative("loss.adjustment", l.adjustment)?;
         }
         let t = &self.tracking;
         count("tracking.align_iterations", t.align_iterations.max(1), 1000, "0 to 1000")?;

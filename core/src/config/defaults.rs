@@ -64,6 +64,7 @@ impl Default for LossConfig {
             color: 5.0,
             semantic: 0.1,
             balance: 0.25,
+            adjustment: 0.5,
         }
     }
 }
@@ -89,6 +90,7 @@ impl Default for TrackingConfig {
                 color: 5.0,
                 semantic: 0.0,
                 balance: 0.0,
+                adjustment: 0.0,
             },
         }
     }

@@ -28,6 +28,7 @@ use crate::{
     recording::{BufferId, Recording},
 };
 use alloc::{vec, vec::Vec};
+use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec3};
 
 /// Workgroups (rows of partial sums) of the geometry decoder's gradient.
@@ -98,6 +99,16 @@ pub struct Batch<'a> {
     pub rare_share: f64,
     /// What fusion and suppressor say about the rays' semantics.
     pub guidance: Guidance,
+}
+
+/// How a class counts in the cross-entropy.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct ClassWeight {
+    /// Weight of labels of the class.
+    pub weight: f32,
+    /// Added to its logit in the loss, and nowhere else.
+    pub adjustment: f32,
 }
 
 /// How fusion and suppressor guide a batch's semantics; all zero: not at all.
@@ -346,7 +357,7 @@ impl Device {
                 rows * (decoder_floats(classes) - GEOMETRY_FLOATS),
             )?,
             no_anchors: e.create_buffer("no anchors", 4)?,
-            class_weights: e.create_buffer("class weights", classes.max(4) as usize)?,
+            class_weights: e.create_buffer("class weights", 2 * classes.max(4) as usize)?,
             class_rarity: e.create_buffer("class rarity", classes.max(4) as usize)?,
             token_class_weights: e.create_buffer("token class weights", classes.max(4) as usize)?,
             targets: e.create_buffer("targets", (slots as usize * targets).max(4))?,
@@ -362,8 +373,9 @@ impl Device {
         r.upload(device.appearance.values, 0, &initial_planes(device.appearance.floats, seed, 1));
         r.upload(device.semantic.values, 0, &initial_planes(device.semantic.floats, seed, 2));
         r.upload(device.decoders.values, 0, &initial_decoders(classes, seed));
-        let equal = vec![1.0_f32; classes as usize];
-        device.upload_class_weights(&mut r, &equal, &equal, &equal);
+        let equal = vec![ClassWeight { weight: 1.0, adjustment: 0.0 }; classes as usize];
+        let ones = vec![1.0; classes as usize];
+        device.upload_class_weights(&mut r, &equal, &ones, &ones);
         device.engine.submit(&r)?;
         Ok(device)
     }
@@ -401,12 +413,12 @@ impl Device {
         }
     }
 
-    /// Weights of the classes in the cross-entropy of rays and of the fusion, and how rare they are;
-    /// one a class.
+    /// How classes count in the cross-entropy of rays, their weights in that of the fusion, and how
+    /// rare they are; one a class.
     pub fn upload_class_weights(
         &self,
         r: &mut Recording,
-        rays: &[f32],
+        rays: &[ClassWeight],
         fusion: &[f32],
         rarity: &[f32],
     ) {

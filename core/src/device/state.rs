@@ -72,7 +72,7 @@ impl Device {
         let classes = self.classes as usize;
         let mut others = vec![
             ("status", self.status, [1, 4], false),
-            ("class_weights", self.class_weights, [1, classes], true),
+            ("class_weights", self.class_weights, [classes, 2], true),
             ("class_rarity", self.class_rarity, [1, classes], true),
             ("token_class_weights", self.token_class_weights, [1, classes], true),
             ("slots.pose_state", self.pose_state, [slots, POSE_STATE_FLOATS], true),

@@ -161,13 +161,19 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             let hidden = semantic_hidden(surface, &get(state, STATE_SEMANTIC));
             let feature = semantic_output(surface, &hidden);
             let logit = |c| class_logit(decoders, &feature, p.classes, c);
-            let (mut best, mut sum, mut own) = (-1e30_f32, 0.0_f32, 0.0);
+            // The cross-entropy sees logits that favour classes as the weights do, so that the
+            // logits themselves, and the classes by them, do not.
+            let adjusted = |c: u32, l: f32| l + class_weights[2 * c as usize + 1];
+            let (mut best, mut sum, mut own, mut best_logit) = (-1e30_f32, 0.0_f32, 0.0, -1e30_f32);
             for c in 0..p.classes {
                 let l = logit(c);
+                if l > best_logit {
+                    (best_logit, best_class) = (l, c);
+                }
+                let l = adjusted(c, l);
                 if l > best {
                     sum = sum * libm::expf(best - l) + 1.0;
                     best = l;
-                    best_class = c;
                 } else {
                     sum += libm::expf(l - best);
                 }
@@ -197,14 +203,14 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                     };
                 }
                 trust = 1.0 - doubt;
-                let weight = class_weights[label as usize] * trust;
+                let weight = class_weights[2 * label as usize] * trust;
                 loss_semantic = weight * (libm::logf(sum) + best - own);
                 scale = weight * p.weight_semantic * inv_rays;
             }
             let mut dfeature = [0.0; 16];
             for c in 0..p.classes {
                 let target = if c == label { 1.0 } else { 0.0 };
-                let g = scale * (libm::expf(logit(c) - best) / sum - target);
+                let g = scale * (libm::expf(adjusted(c, logit(c)) - best) / sum - target);
                 store_f32(&logits[id * p.classes as usize + c as usize], g);
                 let row = head_row(decoders, c);
                 for k in 0..16 {

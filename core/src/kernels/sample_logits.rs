@@ -63,20 +63,25 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                 *sum += w * load_f32(x);
             }
         }
-        let (mut best, mut best_class, mut sum) = (-1e30_f32, 255, 0.0_f32);
-        for (c, v) in composited.iter().enumerate() {
+        let (mut best_logit, mut best_class) = (-1e30_f32, 255);
+        let (mut best, mut sum) = (-1e30_f32, 0.0_f32);
+        for (c, v) in composited.iter_mut().enumerate() {
+            if *v > best_logit {
+                (best_logit, best_class) = (*v, c as u32);
+            }
+            *v += class_weights[2 * c + 1];
             if *v > best {
-                sum = sum * (best - v).exp() + 1.0;
-                (best, best_class) = (*v, c as u32);
+                sum = sum * (best - *v).exp() + 1.0;
+                best = *v;
             } else {
-                sum += (v - best).exp();
+                sum += (*v - best).exp();
             }
         }
         let ray = Ray::load(rays, id);
         let label = ray.class() as usize;
         let (mut loss, mut scale) = (0.0, 0.0);
         if label < classes && !ray.masked() {
-            let weight = class_weights[label];
+            let weight = class_weights[2 * label];
             loss = weight * (sum.ln() + best - composited[label]);
             scale = weight * p.weight_semantic / p.batch_rays as f32;
         }

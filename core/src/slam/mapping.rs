@@ -101,13 +101,9 @@ impl Slam {
             });
         };
         self.class_counts.add(self.info.classes.len(), frame);
-        let ray_weights = self.class_counts.weights(self.config.loss.balance);
-        let token_weights = self.class_counts.weights(self.config.fusion.balance);
-        let rarity = self.class_counts.rarity();
         let device = self.device()?;
         let mut r = Recording::default();
         device.upload_frame(&mut r, slot, frame);
-        device.upload_class_weights(&mut r, &ray_weights, &token_weights, &rarity);
         device.engine.submit(&r)?;
 
         let first = self.keyframes.is_empty();
@@ -367,6 +363,10 @@ impl Slam {
         self.iteration += iterations;
         let last_frame = self.keyframes.last().map_or(0, |k| k.frame);
         let (fusion, suppressor) = (&self.config.fusion, &self.config.suppressor);
+        let rare_share = if semantic { s.semantic_rare_share } else { s.rare_share };
+        let ray_weights = self.class_counts.ray_weights(&loss, rare_share, s.rare_draws);
+        let token_weights = self.class_counts.weights(fusion.balance);
+        let rarity = self.class_counts.rarity();
         let guidance = if semantic {
             Guidance {
                 compression: suppressor.final_weight,
@@ -384,6 +384,7 @@ impl Slam {
         let device = self.device()?;
         let mut touched = BTreeSet::new();
         let mut r = Recording::default();
+        device.upload_class_weights(&mut r, &ray_weights, &token_weights, &rarity);
         for (slot, pose) in &keyframes {
             device.upload_pose(&mut r, *slot, pose);
         }
@@ -421,7 +422,7 @@ impl Slam {
                 loss: &loss,
                 iteration,
                 first: 0,
-                rare_share: if semantic { s.semantic_rare_share } else { s.rare_share },
+                rare_share,
                 guidance,
             };
             rays = batch.frames * batch.rays_per_frame;

@@ -145,3 +145,37 @@ fn a_run_goes_on_from_its_checkpoint_with_the_colours_it_had_found() {
         assert!(block_on(again.checkpoint()).unwrap() == end);
     }
 }
+
+/// Share of the pixels that a map says are of the rarer class, from one frame with three tenths of
+/// its labels so, anywhere, and weights that make five of two.
+fn share_of_rarer(adjustment: f64) -> f64 {
+    let options = SyntheticOptions { width: 64, height: 48, ..SyntheticOptions::default() };
+    let mut room = SyntheticSequence::new(options);
+    let info = room.info().clone();
+    let mut frame = room.frame(0).unwrap();
+    let labels = (0..frame.depth.len() as u32)
+        .map(|i| u8::from(crate::kernels::shared::random_f32(7, 0, i, 0) < 0.3))
+        .collect();
+    frame.labels = Some(labels);
+    let mut config = Config::preset("fast").unwrap();
+    (config.loss.balance, config.loss.adjustment) = (2.0, adjustment);
+    (config.sampling.rare_share, config.sampling.semantic_rare_share) = (0.0, 0.0);
+    (config.suppressor.enabled, config.fusion.enabled) = (false, false);
+    // Too coarse to know each pixel's label by heart.
+    (config.field.surface_coarse_m, config.field.surface_fine_m) = (0.96, 0.48);
+    (config.mapping.rays, config.mapping.first_iterations) = (1000, 60);
+    (config.mapping.final_iterations, config.mapping.semantic_iterations) = (10, 60);
+    let mut slam = block_on(Slam::new(Engine::cpu(), config, &info)).unwrap();
+    block_on(slam.process(&frame)).unwrap();
+    block_on(slam.finish()).unwrap();
+    let pose = slam.trajectory()[0].world_from_camera;
+    let view = block_on(slam.render(&pose, &info.camera)).unwrap();
+    let rarer = view.class.iter().filter(|c| **c == 1).count();
+    rarer as f64 / view.class.len() as f64
+}
+
+#[test]
+fn a_rare_class_weighs_more_without_being_taken_for_more() {
+    let (weighed_up, adjusted) = (share_of_rarer(0.0), share_of_rarer(1.0));
+    assert!(weighed_up > 0.9 && adjusted < 0.1, "{weighed_up} {adjusted}");
+}
