@@ -38,7 +38,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(local_invocation_index) 
             }
             // The own anchor comes by the rival's distance, the rival goes by the own one's: both the more, the closer to a mistake.
             let total = max(matched.z + matched.w, 1e-12);
-            let mistaken = 1.0 / (1.0 + exp(params.slope * (matched.w - matched.z) / total));
+            let mistaken = 1.0 / (1.0 + exp(min(params.slope * (matched.w - matched.z) / total, 80.0)));
             let w = mistaken * select(-matched.z, matched.w, own == wid.x) / total;
             weight += abs(w);
 #for j in 0..4

@@ -222,6 +222,7 @@ fn settle_anchors() -> Vec<Case> {
     vec![
         settle("all classes", all, 300, 10.0),
         settle("two classes", two, 300, 3.0),
+        settle("sharp", all, 300, 150.0),
         settle("no rival", one, 300, 10.0),
         settle("classes alone", all, 0, 10.0),
     ]

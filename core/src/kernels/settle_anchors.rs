@@ -68,7 +68,8 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             }
             let (d, e) = (at[2], at[3]);
             let both = (d + e).max(1e-12);
-            let mistaken = 1.0 / (1.0 + libm::expf(p.slope * (e - d) / both));
+            // The exponential must not overflow, which shaders need not survive.
+            let mistaken = 1.0 / (1.0 + libm::expf((p.slope * (e - d) / both).min(80.0)));
             let weight = mistaken * if own == index { e } else { -d } / both;
             total += weight.abs();
             for (k, s) in sum.iter_mut().enumerate() {
