@@ -78,7 +78,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
         var hs = semantic_hidden(f);
         var feature = semantic_output(hs);
         // The cross-entropy sees logits that favour classes as the weights do, so that the logits themselves, and the
-        // classes by them, do not.
+        // classes by them, need not.
         var best_logit = -1e30;
         var best = -1e30;
         var sum = 0.0;

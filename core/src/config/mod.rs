@@ -124,8 +124,8 @@ pub struct LossConfig {
     pub semantic: f64,
     /// Exponent of the inverse frequency that weighs classes in it: 0 as they come, 1 balanced.
     pub balance: f64,
-    /// Share of those weights, and of what seeking rare classes adds, that does not make the map take
-    /// more for rare classes: 0 all of it does, 1 nothing.
+    /// Share that the loss takes back of how much likelier those weights, and rays that seek rare
+    /// classes, make a class (logit adjustment): 0 nothing, 1 all.
     pub adjustment: f64,
 }
 

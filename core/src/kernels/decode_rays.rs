@@ -162,7 +162,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             let feature = semantic_output(surface, &hidden);
             let logit = |c| class_logit(decoders, &feature, p.classes, c);
             // The cross-entropy sees logits that favour classes as the weights do, so that the
-            // logits themselves, and the classes by them, do not.
+            // logits themselves, and the classes by them, need not.
             let adjusted = |c: u32, l: f32| l + class_weights[2 * c as usize + 1];
             let (mut best, mut sum, mut own, mut best_logit) = (-1e30_f32, 0.0_f32, 0.0, -1e30_f32);
             for c in 0..p.classes {
