@@ -382,7 +382,9 @@ fn anchors_settle_by_the_heads_classes() {
         let b = Batch { iteration: i, ..batch(0.0, 0.0) };
         let mut r = Recording::new();
         d.record_forward(&mut r, &b);
-        d.record_anchor_settling(&mut r, &b, 0.3, i.is_multiple_of(20));
+        // With a rate that falls to 0, as at the end of a run.
+        let rate = 0.3 * f64::from(60 - i) / 60.0;
+        d.record_anchor_settling(&mut r, &b, rate, i.is_multiple_of(20));
         d.engine.submit(&r).unwrap();
     }
     let after = head_and_anchors(&mut d, 999);
