@@ -54,7 +54,14 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(local_invocation_index) 
     var vector: array<vec4f, 4>;
 #for j in 0..4
     vector[${j}] = anchors[at + ${j}u] + step * lane_features[${j}][0];
+#end
+    // It stays where the step would make it another class's: no class loses its last anchor.
+    let class_id = likeliest_class(vector);
+    if (params.rays > 0u && class_id != bitcast<u32>(anchors[at + 4u].x)) {
+        return;
+    }
+#for j in 0..4
     anchors[at + ${j}u] = vector[${j}];
 #end
-    anchors[at + 4u].x = bitcast<f32>(likeliest_class(vector));
+    anchors[at + 4u].x = bitcast<f32>(class_id);
 }

@@ -22,6 +22,7 @@ use mte_slam_core::{
     },
     recording::workgroups_1d,
 };
+use std::collections::BTreeSet;
 
 /// Slots of anchors.
 const ANCHORS: u32 = 21;
@@ -169,10 +170,20 @@ fn match_rivals() -> Vec<Case> {
     vec![one("all classes", CLASSES), one("two classes", 2), one("one class", 1)]
 }
 
-/// A case of `settle_anchors` after `match_rivals`. The head prefers class c along the c-th channel.
+/// A case of `settle_anchors` after `match_rivals`. The head prefers class c along the c-th channel,
+/// and no class without anchors; every third anchor may be of another class than the head's, and every
+/// fourth ray has no rival.
 fn settle(name: &'static str, before: &Case, rays: u32, slope: f32) -> Case {
     let [out, anchors, labels, state] = &before.buffers[..] else { unreachable!() };
-    let mut state = state.clone();
+    let (mut anchors, mut state) = (anchors.clone(), state.clone());
+    let known: BTreeSet<u32> =
+        anchors.chunks_exact(ANCHOR_FLOATS).map(|a| a[16]).filter(|c| *c != 255).collect();
+    for (i, a) in anchors.chunks_exact_mut(ANCHOR_FLOATS).enumerate() {
+        if a[16] != 255 && i % 3 > 0 {
+            let along = |c: &&u32| f32::from_bits(a[**c as usize]);
+            a[16] = *known.iter().max_by(|x, y| along(x).total_cmp(&along(y))).unwrap();
+        }
+    }
     let row = |i: usize| i * RAY_STATE_FLOATS..(i + 1) * RAY_STATE_FLOATS;
     for (i, out) in out.chunks_exact(RAY_OUT_FLOATS).enumerate() {
         let state = &mut state[row(i)];
@@ -186,7 +197,10 @@ fn settle(name: &'static str, before: &Case, rays: u32, slope: f32) -> Case {
                 *n = (index as u32, d);
             }
         }
-        let [own, rival] = nearest;
+        let [own, mut rival] = nearest;
+        if i % 4 == 3 {
+            rival = (NO_ANCHOR, NO_DISTANCE);
+        }
         state[STATE_ANCHOR as usize * 4..][..4].copy_from_slice(&[
             own.0,
             rival.0,
@@ -197,6 +211,9 @@ fn settle(name: &'static str, before: &Case, rays: u32, slope: f32) -> Case {
     let mut decoders = vec![0.0; decoder_floats(CLASSES)];
     for c in 0..CLASSES as usize {
         decoders[HEAD_FLOATS + c * 16 + c] = 1.0;
+        if !known.contains(&(c as u32)) {
+            decoders[HEAD_FLOATS + CLASSES as usize * 16 + c] = -10.0;
+        }
     }
     let p = SettleAnchorsParams {
         rays,
@@ -210,7 +227,7 @@ fn settle(name: &'static str, before: &Case, rays: u32, slope: f32) -> Case {
         name,
         kernel: &SETTLE_ANCHORS,
         params: words(&p),
-        buffers: vec![labels.clone(), state, f32_words(decoders), anchors.clone()],
+        buffers: vec![labels.clone(), state, f32_words(decoders), anchors],
         workgroups: [ANCHORS, 1, 1],
         tolerance: anchor_tolerance(&SETTLE_ANCHORS),
         overwritten: Vec::new(),
@@ -218,12 +235,11 @@ fn settle(name: &'static str, before: &Case, rays: u32, slope: f32) -> Case {
 }
 
 fn settle_anchors() -> Vec<Case> {
-    let [all, two, one] = &match_rivals()[..] else { unreachable!() };
+    let [all, two, _] = &match_rivals()[..] else { unreachable!() };
     vec![
         settle("all classes", all, 300, 10.0),
         settle("two classes", two, 300, 3.0),
-        settle("sharp", all, 300, 150.0),
-        settle("no rival", one, 300, 10.0),
+        settle("sharp", all, 300, 400.0),
         settle("classes alone", all, 0, 10.0),
     ]
 }

@@ -106,6 +106,31 @@ fn the_problem_is_not_trivial() {
     assert_eq!(state.buffers["status"][0], 0, "no gradient saturates");
 }
 
+/// Anchors that settle move, but for those that the head would then give another class.
+#[test]
+fn anchors_that_settle_keep_their_class() {
+    let case = &cases("settle_anchors")[0];
+    let after = run(&mut Engine::cpu(), case, &case.buffers);
+    let decoders: Vec<f32> = case.buffers[2].iter().map(|w| f32::from_bits(*w)).collect();
+    let (before, after) = (&case.buffers[3], &after[3]);
+    let (mut moved, mut stayed) = (0, 0);
+    for (b, a) in before.chunks_exact(ANCHOR_FLOATS).zip(after.chunks_exact(ANCHOR_FLOATS)) {
+        assert_eq!(b[16], a[16]);
+        let vector = std::array::from_fn(|k| f32::from_bits(a[k]));
+        let head = likeliest_class(&decoders, &vector, CLASSES);
+        match (a[16], a[..16] == b[..16]) {
+            (255, same) => assert!(same),
+            (class, true) if class != head => stayed += 1,
+            (class, false) => {
+                assert_eq!(class, head);
+                moved += 1;
+            }
+            _ => {}
+        }
+    }
+    assert!(moved > 10 && stayed > 2, "{moved} moved, {stayed} stayed");
+}
+
 /// One changed bit in any float, integer or counter that a kernel wrote is a mismatch.
 #[test]
 fn a_perturbed_output_is_caught() {

@@ -384,7 +384,7 @@ fn anchors_settle_by_the_heads_classes() {
         d.record_forward(&mut r, &b);
         // With a rate that falls to 0, as at the end of a run.
         let rate = 0.3 * f64::from(60 - i) / 60.0;
-        d.record_anchor_settling(&mut r, &b, rate, i.is_multiple_of(20));
+        d.record_anchor_settling(&mut r, &b, rate, i == 0);
         d.engine.submit(&r).unwrap();
     }
     let after = head_and_anchors(&mut d, 999);

@@ -175,7 +175,7 @@ impl Default for SuppressorConfig {
             min_importance: 100.0,
             min_age: 40,
             doubt: 1.0,
-            settle_share: 0.1,
+            settle_share: 0.3,
             inference: Inference::Head,
         }
     }

@@ -97,7 +97,7 @@ pub struct SamplingConfig {
     pub near_m: f64,
     /// Intervals lighter than this carry no appearance or semantics.
     pub min_weight: f64,
-    /// Share of mapping's rays that seek rare classes.
+    /// Share of the rays of mapping, and of those that settle anchors, that seek rare classes.
     pub rare_share: f64,
     /// The same while the semantics are trained alone; wrong labels are rare, too, and there they
     /// would undo what doubting them brings.

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 /// How sharply the settling of anchors minds rays that are mistaken, or nearly so: with less, rays well
 /// inside a common class wear the border to a rare one down.
-const SETTLE_SLOPE: f32 = 150.0;
+const SETTLE_SLOPE: f32 = 400.0;
 
 /// Buffers of the suppressor.
 pub struct Suppressor {
@@ -118,9 +118,9 @@ impl Device {
     }
 
     /// Moves the anchors so that the nearest one tells the head's class of the last forward pass's
-    /// rays; nothing else changes, but that the rays count for those classes from then on. With
-    /// `fill` they stay, and classes of the head without an anchor get one.
-    pub fn record_anchor_settling(&self, r: &mut Recording, b: &Batch<'_>, rate: f64, fill: bool) {
+    /// rays, then gives classes of the head without an anchor one; nothing else changes, but that
+    /// the rays count for those classes from then on. `begin`: anchors first take the head's classes.
+    pub fn record_anchor_settling(&self, r: &mut Recording, b: &Batch<'_>, rate: f64, begin: bool) {
         let Some(s) = &self.suppressor else { return };
         let (anchors, classes) = (s.config.anchors, self.classes);
         let settle = |r: &mut Recording, rays| {
@@ -138,7 +138,7 @@ impl Device {
                 [anchors, 1, 1],
             );
         };
-        if fill {
+        if begin {
             settle(r, 0);
         }
         let rays = b.frames * b.rays_per_frame;
@@ -148,25 +148,22 @@ impl Device {
             &[self.ray_out, s.anchors, self.rays, self.ray_state],
             rays as usize,
         );
-        if fill {
-            r.dispatch(
-                &MAINTAIN_ANCHORS,
-                &MaintainAnchorsParams {
-                    rays,
-                    anchors,
-                    classes,
-                    spawns: classes,
-                    // None but the first of a class; none goes but for it.
-                    spawn_distance: 0.5 * NO_DISTANCE,
-                    min_age: f32::MAX,
-                    ..MaintainAnchorsParams::default()
-                },
-                &[self.rays, self.ray_state, s.anchors, s.votes, s.counts],
-                [1, 1, 1],
-            );
-        } else {
-            settle(r, rays);
-        }
+        settle(r, rays);
+        r.dispatch(
+            &MAINTAIN_ANCHORS,
+            &MaintainAnchorsParams {
+                rays,
+                anchors,
+                classes,
+                spawns: classes,
+                // None but the first of a class; none goes but for it.
+                spawn_distance: 0.5 * NO_DISTANCE,
+                min_age: f32::MAX,
+                ..MaintainAnchorsParams::default()
+            },
+            &[self.rays, self.ray_state, s.anchors, s.votes, s.counts],
+            [1, 1, 1],
+        );
     }
 
     /// What the suppressor did so far; `None` without one.

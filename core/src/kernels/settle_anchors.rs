@@ -78,11 +78,17 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         }
         if total > 0.0 {
             let step = p.rate / total.max(1e-12);
-            for ((v, s), cell) in vector.iter_mut().zip(sum).zip(anchor) {
+            for (v, s) in vector.iter_mut().zip(sum) {
                 *v += step * s;
-                store_f32(cell, *v);
             }
         }
-        store_u32(&anchor[16], likeliest_class(decoders, &vector, p.classes));
+        let class = likeliest_class(decoders, &vector, p.classes);
+        if p.rays > 0 && class != load_u32(&anchor[16]) {
+            return;
+        }
+        for (v, cell) in vector.iter().zip(anchor) {
+            store_f32(cell, *v);
+        }
+        store_u32(&anchor[16], class);
     });
 }

@@ -184,7 +184,7 @@ impl Slam {
         let iterations = (total - done).min(FINISH_ITERATIONS);
         let left = f64::from(total - done) / f64::from(total);
         if part == Part::Anchors {
-            self.settle_anchors(iterations, left).await?;
+            self.settle_anchors(iterations, left, done == 0).await?;
         } else {
             let (m, f) = (&self.config.mapping, &self.config.fusion);
             let semantic = part == Part::Semantics;
@@ -223,8 +223,13 @@ impl Slam {
     }
 
     /// Lets the anchors settle by what the head says of rays over all keyframes. `left` is the share
-    /// of the part that is still to be done.
-    async fn settle_anchors(&mut self, iterations: u32, left: f64) -> Result<(), SlamError> {
+    /// of the part that is still to be done, `first` whether that is all.
+    async fn settle_anchors(
+        &mut self,
+        iterations: u32,
+        left: f64,
+        first: bool,
+    ) -> Result<(), SlamError> {
         let (m, s) = (self.config.mapping.clone(), self.config.sampling.clone());
         let loss = self.config.loss.clone();
         let (seed, breathe) = (self.config.seed, self.breathe);
@@ -249,17 +254,18 @@ impl Slam {
             let batch = Batch {
                 frames,
                 rays_per_frame: m.rays / frames,
-                stratified: SEMANTIC_STRATIFIED,
-                surface: s.surface,
-                flags: FLAG_GUIDED | FLAG_MAP,
+                // As views are rendered, without guidance: what silhouettes blend is to be told, too.
+                stratified: (s.render_stratified / 4).max(1),
+                surface: (s.render_surface / 2).max(1),
+                flags: 0,
                 loss: &loss,
                 iteration,
                 first: 0,
-                rare_share: s.semantic_rare_share,
+                rare_share: s.rare_share,
                 guidance: Guidance::default(),
             };
             device.record_forward(&mut r, &batch);
-            device.record_anchor_settling(&mut r, &batch, SETTLE_RATE * left, i == 0);
+            device.record_anchor_settling(&mut r, &batch, SETTLE_RATE * left, first && i == 0);
             submit_when_due(device, &mut r, i + 1, iterations, breathe).await?;
         }
         let counts = device.read_anchor_counts().await?;
