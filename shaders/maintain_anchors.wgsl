@@ -15,9 +15,10 @@ struct Params {
     stable: f32,
     min_importance: f32,
     min_age: f32,
+    // 1: only classes that labels bear out get anchors.
+    supported: u32,
     spare0: u32,
     spare1: u32,
-    spare2: u32,
 }
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> rays: array<Ray>;
@@ -27,6 +28,8 @@ struct Params {
 @group(0) @binding(4) var<storage, read_write> votes: array<f32>;
 // Alive, spawned, dropped, merged.
 @group(0) @binding(5) var<storage, read_write> anchor_counts: array<u32>;
+// Per class of the head: rays whose labels agree, and do not.
+@group(0) @binding(6) var<storage, read> class_support: array<u32>;
 
 const FREE: u32 = 255u;
 const NONE: u32 = 0xffffffffu;
@@ -51,6 +54,10 @@ fn clear(i: u32) {
     of_class[FREE] += 1u;
     class_at[i] = FREE;
     marked[i] = 0u;
+}
+// More labels than not agree, and not by a single one.
+fn borne_out(class_id: u32) -> bool {
+    return params.supported == 0u || class_support[2u * class_id] > class_support[2u * class_id + 1u] + 1u;
 }
 fn feature_distance(ray: u32, i: u32) -> f32 {
     var d = 0.0;
@@ -158,7 +165,7 @@ fn main(@builtin(local_invocation_index) lane: u32) {
         var chosen = NONE;
         for (var ray = lane; ray < params.rays; ray += WORKGROUP_SIZE) {
             let class_id = ray_class(rays[ray]);
-            if ((rays[ray].frame & 0x80000000u) != 0u || class_id >= params.classes) {
+            if ((rays[ray].frame & 0x80000000u) != 0u || class_id >= params.classes || !borne_out(class_id)) {
                 continue;
             }
             let match_state = ray_state[ray * ${RAY_STATE_VEC4}u + ${STATE_ANCHOR}u];

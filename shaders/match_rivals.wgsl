@@ -6,8 +6,8 @@
 struct Params {
     rays: u32,
     anchors: u32,
+    classes: u32,
     spare0: u32,
-    spare1: u32,
 }
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> ray_out: array<vec4f>;
@@ -15,6 +15,8 @@ struct Params {
 @group(0) @binding(2) var<storage, read> anchors: array<vec4f>;
 @group(0) @binding(3) var<storage, read_write> rays: array<Ray>;
 @group(0) @binding(4) var<storage, read_write> ray_state: array<vec4f>;
+// Per class of the head: rays whose labels agree, and do not.
+@group(0) @binding(5) var<storage, read_write> class_support: array<atomic<u32>>;
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
@@ -48,6 +50,10 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
             rival = a;
             rival_distance = d;
         }
+    }
+    let label = ray_class(rays[ray]);
+    if ((rays[ray].frame & 0x80000000u) == 0u && class_id < params.classes && label < params.classes) {
+        atomicAdd(&class_support[2u * class_id + select(0u, 1u, label != class_id)], 1u);
     }
     rays[ray].label = (rays[ray].label & 0xffffff00u) | (class_id & 255u);
     ray_state[state + ${STATE_ANCHOR}u] = vec4f(bitcast<f32>(own), bitcast<f32>(rival), own_distance, rival_distance);

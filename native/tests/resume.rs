@@ -265,7 +265,7 @@ fn what_does_not_fit_is_refused() {
     fs::write(&path, &flipped).unwrap();
     refused(folder, &short, 1, &["checksum", "damaged"]);
     let mut version = bytes.clone();
-    let at = find(&version, b"mte-slam-5");
+    let at = find(&version, b"mte-slam-6");
     version[at + 9] = b'9';
     fs::write(&path, &version).unwrap();
     refused(folder, &short, 1, &["checkpoint.safetensors"]);

@@ -134,6 +134,11 @@ fn spread_anchors(classes: u32) -> Vec<u32> {
         .collect()
 }
 
+/// Labels that agree with the head's class and do not, by class: they bear out 0 and 2.
+fn support() -> Vec<u32> {
+    vec![9, 0, 0, 0, 3, 1, 2, 1, 5, 9]
+}
+
 /// What `decode_rays` leaves of rays' classes: the labels', unlabelled rays a class by their number.
 fn ray_out(rays: &[Ray]) -> Vec<u32> {
     let mut out = random(rays.len() * RAY_OUT_FLOATS, 374, 1.0);
@@ -150,18 +155,19 @@ fn match_rivals() -> Vec<Case> {
         let anchors = spread_anchors(classes);
         let state = matched(&rays, &features, &anchors);
         let out = ray_out(&rays);
-        // Labels are not what counts.
-        rays.iter_mut().for_each(|ray| ray.label ^= 1);
+        // Half of the labels are not the head's.
+        rays.iter_mut().step_by(2).for_each(|ray| ray.label ^= 1);
         let p = MatchRivalsParams {
             rays: rays.len() as u32,
             anchors: ANCHORS,
+            classes: CLASSES,
             ..MatchRivalsParams::default()
         };
         Case {
             name,
             kernel: &MATCH_RIVALS,
             params: words(&p),
-            buffers: vec![out, anchors, ray_words(&rays), state],
+            buffers: vec![out, anchors, ray_words(&rays), state, support()],
             workgroups: workgroups_1d(rays.len(), 64),
             tolerance: anchor_tolerance(&MATCH_RIVALS),
             overwritten: Vec::new(),
@@ -174,7 +180,7 @@ fn match_rivals() -> Vec<Case> {
 /// and no class without anchors; every third anchor may be of another class than the head's, and every
 /// fourth ray has no rival.
 fn settle(name: &'static str, before: &Case, rays: u32, slope: f32) -> Case {
-    let [out, anchors, labels, state] = &before.buffers[..] else { unreachable!() };
+    let [out, anchors, labels, state, _] = &before.buffers[..] else { unreachable!() };
     let (mut anchors, mut state) = (anchors.clone(), state.clone());
     let known: BTreeSet<u32> =
         anchors.chunks_exact(ANCHOR_FLOATS).map(|a| a[16]).filter(|c| *c != 255).collect();
@@ -287,6 +293,8 @@ struct Maintenance {
     spawn_distance: f32,
     /// Classes of the rays' labels.
     labels: u32,
+    /// Only classes that labels bear out get anchors.
+    supported: bool,
 }
 
 /// Cases of `maintain_anchors`, with what they must do: (alive, spawned, dropped, merged).
@@ -303,6 +311,7 @@ pub fn maintenance() -> Vec<(Case, [u32; 4])> {
         spawns: 0,
         spawn_distance: 1e9,
         labels: CLASSES,
+        supported: false,
     };
     let far = vec![(9.0, class(0)), (-9.0, class(1)), (19.0, class(2))];
     let all_classes: Vec<_> = (0..CLASSES).map(|c| (0.1 * c as f32, class(c))).collect();
@@ -365,6 +374,16 @@ pub fn maintenance() -> Vec<(Case, [u32; 4])> {
         (
             Maintenance { spawns: 7, spawn_distance: 1e6, ..plain("first anchors", vec![]) },
             [CLASSES, CLASSES, 0, 0],
+        ),
+        // The first anchors of those that labels bear out.
+        (
+            Maintenance {
+                spawns: 7,
+                spawn_distance: 1e6,
+                supported: true,
+                ..plain("borne out", vec![])
+            },
+            [2, 2, 0, 0],
         ),
         // Features far from their class's anchors, as many as may.
         (Maintenance { spawns: 6, spawn_distance: 1.0, ..plain("spawn", far) }, [9, 6, 0, 0]),
@@ -459,6 +478,7 @@ fn maintenance_case(m: &Maintenance) -> Case {
         stable: 0.1,
         min_importance: 1.0,
         min_age: 40.0,
+        supported: u32::from(m.supported),
         ..MaintainAnchorsParams::default()
     };
     let state = matched(&rays, &features, &anchors);
@@ -466,7 +486,7 @@ fn maintenance_case(m: &Maintenance) -> Case {
         name: m.name,
         kernel: &MAINTAIN_ANCHORS,
         params: words(&p),
-        buffers: vec![ray_words(&rays), state, anchors, votes(m.slots), vec![0; 4]],
+        buffers: vec![ray_words(&rays), state, anchors, votes(m.slots), vec![0; 4], support()],
         workgroups: [1, 1, 1],
         tolerance: anchor_tolerance(&MAINTAIN_ANCHORS),
         overwritten: Vec::new(),

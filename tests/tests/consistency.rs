@@ -416,6 +416,7 @@ fn anchors_are_dropped_merged_and_spawned() {
         assert_eq!(alive as u32, counts[0], "{}", case.name);
         let (before, after) = (classes(&case.buffers[2]), classes(&after[2]));
         assert!(before.iter().all(|c| after.contains(c)), "{}: a class is lost", case.name);
+        assert!(case.name != "borne out" || after == [0, 2], "{after:?}");
         assert!(case.name != "evict" || after == (0..5).collect::<Vec<_>>(), "{after:?}");
         total.iter_mut().zip(counts).for_each(|(t, c)| *t += c);
     }

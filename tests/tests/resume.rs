@@ -217,8 +217,8 @@ fn what_does_not_fit_is_refused_with_its_reason() {
         *entry = entry.replacen(from, to, 1);
         changed
     };
-    let parts = ["format", "mte-slam-4", "mte-slam-5"];
-    refused(&config, info, &with("format", "mte-slam-5", "mte-slam-4"), &parts);
+    let parts = ["format", "mte-slam-5", "mte-slam-6"];
+    refused(&config, info, &with("format", "mte-slam-6", "mte-slam-5"), &parts);
     refused(&config, info, &with("state", "\"seed\":5", "\"seed\":6"), &["configuration"]);
     refused(&config, info, &with("state", "\"free_slots\":[", "\"free_slots\":[1,"), &["slots"]);
     refused(

@@ -85,6 +85,7 @@ impl Device {
             others.push(("anchors", s.anchors, [n, ANCHOR_FLOATS], false));
             others.push(("anchors.votes", s.votes, [n, classes], true));
             others.push(("anchors.counts", s.counts, [1, 4], false));
+            others.push(("anchors.support", s.support, [classes, 2], false));
         }
         all.extend(others.into_iter().map(|(name, buffer, shape, floats)| StateBuffer {
             name: name.into(),

@@ -26,6 +26,8 @@ pub struct Suppressor {
     /// Votes of the matched rays' labels, one float a slot and class.
     pub votes: BufferId,
     pub(super) counts: BufferId,
+    /// Since the anchors began to settle: rays of each class of the head whose labels agree, and do not.
+    pub(super) support: BufferId,
     config: SuppressorConfig,
 }
 
@@ -53,6 +55,7 @@ impl Suppressor {
             anchors: e.create_buffer("anchors", n * ANCHOR_FLOATS)?,
             votes: e.create_buffer("votes", n * classes as usize)?,
             counts: e.create_buffer("anchor counts", 4)?,
+            support: e.create_buffer("class support", 2 * classes as usize)?,
             config: config.clone(),
         };
         let mut free = vec![0_u32; n * ANCHOR_FLOATS];
@@ -112,14 +115,15 @@ impl Device {
                 min_age: f64::from(c.min_age) as f32,
                 ..MaintainAnchorsParams::default()
             },
-            &[self.rays, self.ray_state, s.anchors, s.votes, s.counts],
+            &[self.rays, self.ray_state, s.anchors, s.votes, s.counts, s.support],
             [1, 1, 1],
         );
     }
 
     /// Moves the anchors so that the nearest one tells the head's class of the last forward pass's
-    /// rays, then gives classes of the head without an anchor one; nothing else changes, but that
-    /// the rays count for those classes from then on. `begin`: anchors first take the head's classes.
+    /// rays, then gives classes of the head without an anchor one, if labels bear them out; nothing
+    /// else changes, but that the rays count for the head's classes from then on. `begin`: anchors
+    /// first take the head's classes, and no label has spoken yet.
     pub fn record_anchor_settling(&self, r: &mut Recording, b: &Batch<'_>, rate: f64, begin: bool) {
         let Some(s) = &self.suppressor else { return };
         let (anchors, classes) = (s.config.anchors, self.classes);
@@ -139,13 +143,14 @@ impl Device {
             );
         };
         if begin {
+            r.upload(s.support, 0, &vec![0_u32; 2 * classes as usize]);
             settle(r, 0);
         }
         let rays = b.frames * b.rays_per_frame;
         r.dispatch_1d(
             &MATCH_RIVALS,
-            &MatchRivalsParams { rays, anchors, ..MatchRivalsParams::default() },
-            &[self.ray_out, s.anchors, self.rays, self.ray_state],
+            &MatchRivalsParams { rays, anchors, classes, ..MatchRivalsParams::default() },
+            &[self.ray_out, s.anchors, self.rays, self.ray_state, s.support],
             rays as usize,
         );
         settle(r, rays);
@@ -159,9 +164,10 @@ impl Device {
                 // None but the first of a class; none goes but for it.
                 spawn_distance: 0.5 * NO_DISTANCE,
                 min_age: f32::MAX,
+                supported: 1,
                 ..MaintainAnchorsParams::default()
             },
-            &[self.rays, self.ray_state, s.anchors, s.votes, s.counts],
+            &[self.rays, self.ray_state, s.anchors, s.votes, s.counts, s.support],
             [1, 1, 1],
         );
     }

@@ -27,12 +27,12 @@ params! {
         min_importance: f32,
         /// Updates before an anchor may be dropped or merged.
         min_age: f32,
+        /// 1: only classes that labels bear out (`class_support`) get anchors.
+        supported: u32,
         /// Unused.
         spare0: u32,
         /// Unused.
         spare1: u32,
-        /// Unused.
-        spare2: u32,
     }
 }
 
@@ -50,6 +50,7 @@ kernel! {
             anchors: ReadWrite,
             votes: ReadWrite,
             anchor_counts: ReadWrite,
+            class_support: Read,
         ],
     }
 }
@@ -91,6 +92,12 @@ fn twin(dispatch: &CpuDispatch<'_>) {
     let set =
         Set { anchors: dispatch.write(2), votes: dispatch.write(3), classes: p.classes as usize };
     let counts = dispatch.write(4);
+    let support = dispatch.read_f32(5);
+    // More labels than not agree, and not by a single one.
+    let borne_out = |class: u32| {
+        let [agree, disagree] = [0, 1].map(|k| support[2 * class as usize + k].to_bits());
+        p.supported == 0 || agree > disagree + 1
+    };
     let n = p.anchors as usize;
     let mut of_class = [0_u32; 256];
     for i in 0..n {
@@ -147,7 +154,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         let (mut furthest, mut chosen) = (p.spawn_distance, None);
         for ray in 0..p.rays as usize {
             let r = Ray::load(ray_words, ray);
-            if r.masked() || r.class() >= p.classes {
+            if r.masked() || r.class() >= p.classes || !borne_out(r.class()) {
                 continue;
             }
             let at = ray * RAY_STATE_FLOATS + STATE_ANCHOR as usize * 4;

@@ -71,7 +71,7 @@ pub struct Checkpoint {
     pub metadata: BTreeMap<String, String>,
 }
 
-const FORMAT: &str = "mte-slam-5";
+const FORMAT: &str = "mte-slam-6";
 
 /// What is the same for all frames, as far as it decides what a run computes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
