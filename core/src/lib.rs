@@ -25,6 +25,7 @@ pub mod pose;
 pub mod recording;
 mod safetensors;
 pub mod sequence;
+pub mod settings;
 pub mod shader;
 pub mod slam;
 pub mod synth;

@@ -30,7 +30,7 @@ use crate::{
     mesh::MeshError,
     pose::Pose,
     recording::Recording,
-    track::odometry::{ColourRegistration, Odometer, OdometryConfig, OdometryError},
+    track::odometry::{ColourRegistration, Odometer, OdometryError},
 };
 use alloc::{borrow::Cow, boxed::Box, format, string::String, vec::Vec};
 use core::{future::Future, pin::Pin};
@@ -42,7 +42,7 @@ pub enum SlamError {
     #[error(transparent)]
     Engine(#[from] EngineError),
     /// The configuration is not usable.
-    #[error(transparent)]
+    #[error("configuration: {0}")]
     Config(#[from] ConfigError),
     /// Tracking could not even be tried.
     #[error(transparent)]
@@ -206,13 +206,14 @@ impl Slam {
 
     fn without_engine(config: Config, info: &SequenceInfo) -> Result<Slam, SlamError> {
         config.validate()?;
+        let odometer = Odometer::new(config.odometry.clone());
         Ok(Slam {
             config,
             breathe: None,
             info: info.clone(),
             engine: None,
             device: None,
-            odometer: Odometer::new(OdometryConfig::default()),
+            odometer,
             registration: ColourRegistration::default(),
             registrations: Vec::new(),
             frames: Vec::new(),

@@ -31,7 +31,7 @@ pub(super) struct Calibration {
 impl Odometer {
     /// Pair the newest keyframe with those before and estimate the registration again.
     pub(super) fn calibrate(&mut self) {
-        if self.calibration.pairs.len() >= self.config.registration_pairs {
+        if self.calibration.pairs.len() >= self.config.registration_pairs as usize {
             return;
         }
         let Some((newer, others)) = self.keyframes.split_last() else { return };
@@ -102,7 +102,7 @@ impl Odometer {
                 .filter(|&(share, _)| share > 0.2)
                 .collect();
             shares.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
-            shares.truncate(self.config.references.max(1));
+            shares.truncate(self.config.references.max(1) as usize);
             let references: Vec<Reference<'_>> = shares
                 .iter()
                 .map(|&(_, j)| Reference {

@@ -356,7 +356,7 @@ impl Odometer {
             Some(r) => align_levels(&[r], current, start, align, usize::MAX, 1)?.pose,
             None => *start,
         };
-        let chosen = self.choose(current, &coarse, self.config.references.max(1));
+        let chosen = self.choose(current, &coarse, self.config.references.max(1) as usize);
         let mut references: Vec<Reference<'_>> = chosen
             .iter()
             .map(|&k| Reference {
@@ -543,7 +543,7 @@ impl Odometer {
         if self.config.pose_graph {
             self.link_newest();
         }
-        if self.keyframes.len() > self.config.max_keyframes.max(2) {
+        if self.keyframes.len() > self.config.max_keyframes.max(2) as usize {
             self.drop_keyframe();
         }
         id
@@ -622,7 +622,7 @@ impl Odometer {
             .filter(|&(share, _)| share > 0.3)
             .collect();
         shares.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
-        shares.truncate(self.config.graph_links);
+        shares.truncate(self.config.graph_links as usize);
         shares
     }
 }
