@@ -1,5 +1,5 @@
 //! The complete configuration of a run. Each setting is declared once, here or in
-//! [`crate::track::odometry`], with its documentation, unit, default and range; presets change
+//! [`mte_slam_odometry`], with its documentation, unit, default and range; presets change
 //! some of the defaults.
 mod check;
 pub mod guide;
@@ -11,13 +11,11 @@ pub use semantics::{
     AnchorRule, FusionConfig, Head, Inference, SemanticsConfig, SuppressorConfig,
 };
 
-use crate::{
-    settings::{self, Entry, Value},
-    track::odometry::OdometryConfig,
-};
+use crate::settings::{self, Entry, Value};
 use alloc::vec::Vec;
+use mte_slam_odometry::OdometryConfig;
 
-crate::choices! {
+mte_slam_types::choices! {
     /// How the camera is tracked against the map.
     pub enum Tracker {
         /// RGB-D alignment to the last frame and keyframes, then Gauss-Newton against the field.
@@ -40,7 +38,7 @@ crate::choices! {
     }
 }
 
-crate::settings! {
+mte_slam_types::settings! {
     /// Everything that decides a run beside its input.
     pub struct Config {
         /// Seed of every random number.

@@ -1,5 +1,5 @@
 //! Settings of the semantic modules.
-crate::choices! {
+mte_slam_types::choices! {
     /// Where a pixel's class comes from.
     pub enum Head {
         /// Features are composited and decoded once per ray.
@@ -28,7 +28,7 @@ crate::choices! {
     }
 }
 
-crate::settings! {
+mte_slam_types::settings! {
     /// Semantics.
     pub struct SemanticsConfig {
         /// What turns semantic features into classes.

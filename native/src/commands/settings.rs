@@ -14,7 +14,7 @@ pub fn run(args: &SettingsArgs, screen: Screen) -> Result<()> {
         );
     };
     let lines = guide::plain(&config, &args.word);
-    if lines.is_empty() {
+    if lines.is_empty() && !args.word.is_empty() {
         usage!("no setting contains `{}`", args.word);
     }
     let mut text = String::new();

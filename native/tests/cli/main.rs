@@ -4,3 +4,4 @@ mod labels;
 mod outputs;
 mod program;
 mod refusals;
+mod settings;
