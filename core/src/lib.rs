@@ -11,7 +11,6 @@ pub mod classes;
 pub mod config;
 #[cfg(feature = "dataset")]
 pub mod dataset;
-pub mod device;
 pub mod engine;
 pub mod field;
 pub mod frame;
@@ -19,6 +18,7 @@ pub mod hash;
 pub mod kernels;
 pub mod keyframe;
 pub mod layout;
+pub mod map;
 pub mod mesh;
 pub mod metrics;
 pub mod pose;

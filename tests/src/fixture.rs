@@ -6,7 +6,6 @@ use glam::DVec3;
 use mte_slam_core::{
     camera::Camera,
     config::FieldConfig,
-    device::pose_words,
     engine::{Engine, EngineError},
     field::{FieldShape, initial_decoders},
     frame::{Bounds, Frame},
@@ -15,6 +14,7 @@ use mte_slam_core::{
         shared::{FLAG_GUIDED, FLAG_MAP, FLAG_MASK, FLAG_POSE, RAY_WORDS},
     },
     layout::{BACKWARD_STRIP, FieldParams, RAY_OUT_FLOATS, RAY_STATE_FLOATS},
+    map::pose_words,
     pose::Pose,
     recording::{Command, Recording, workgroups_1d},
 };

@@ -4,7 +4,7 @@ use super::timings::Spread;
 use crate::resume::SavingFigures;
 use mte_slam_core::{
     classes::{Class, ClassTable},
-    device::AnchorCounts,
+    map::AnchorCounts,
     metrics::{
         AteReport, BoundaryReport, DepthReport, MeshDepthReport, PsnrReport, SMALL_SHARE_PERCENT,
         SemanticReport, SurfaceReport,
