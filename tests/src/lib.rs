@@ -267,3 +267,8 @@ impl TestRandom {
         low + (high - low) * (self.bits() >> 8) as f32 / (1 << 24) as f32
     }
 }
+
+/// The README's example must compile.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+pub struct Readme;
