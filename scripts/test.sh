@@ -5,7 +5,7 @@
 # MTE_SLAM_REQUIRE_GPU=1      tests that find no adapter fail instead of using the CPU engine alone
 # MTE_SLAM_REQUIRE_TARGETS=1  fail, not skip, where no compiler for the two other targets can be had
 # MTE_SLAM_REQUIRE_BROWSER=1  fail, not skip, where there is no Chromium or no Node
-# MTE_SLAM_REQUIRE_PYTHON=1   fail, not skip, where no Python 3 has numpy and Pillow
+# MTE_SLAM_REQUIRE_PYTHON=1   fail, not skip, where no Python 3 has tests/requirements.txt
 # MTE_SLAM_REQUIRE_SNAKEMAKE=1  fail, not skip, where there is no Snakemake
 # MTE_SLAM_CROSS              see scripts/wasm-toolchain.sh
 set -eu
