@@ -41,12 +41,7 @@ setup=$(sh ./scripts/wasm-toolchain.sh)
     cargo rustc --locked --release -p mte-slam-tests --lib --crate-type cdylib \
         --target wasm32-unknown-unknown
 )
-version=$(sed -n '/^name = "wasm-bindgen"$/{n;s/version = "\(.*\)"/\1/p;}' Cargo.lock)
-tools=${MTE_SLAM_TOOLS:-${XDG_CACHE_HOME:-$HOME/.cache}/mte-slam/tools}
-bindgen=$(command -v wasm-bindgen || true)
-if [ -z "$bindgen" ] || [ "$("$bindgen" --version)" != "wasm-bindgen $version" ]; then
-    bindgen=$tools/wasm-bindgen-$version/bin/wasm-bindgen
-fi
+bindgen=$(./scripts/bindgen.sh)
 "$bindgen" --target web --no-typescript --out-dir "$target/web/consistency" \
     "$target/web/wasm32-unknown-unknown/release/mte_slam_tests.wasm"
 
