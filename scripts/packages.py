@@ -30,7 +30,7 @@ def problems(package):
     for dependency in package["dependencies"]:
         if dependency.get("path") and dependency["kind"] != "dev" and dependency["req"] == "*":
             yield f"the dependency {dependency['name']} has no version"
-    files = set(cargo("package", "--locked", "--allow-dirty", "--list", "-p", name).split("\n"))
+    files = set(cargo("package", "--quiet", "--locked", "--allow-dirty", "--list", "-p", name).split("\n"))
     for file in ("LICENSE-MIT", "LICENSE-APACHE"):
         if file not in files:
             yield f"{file} is not in it"
