@@ -2,7 +2,7 @@
 // with an online softmax. One invocation a query.
 #import shared/tokens.wgsl
 
-@group(0) @binding(1) var<storage, read_write> tokens: array<f32>;
+#bindings
 
 var<workgroup> keys: array<vec4f, 256>;
 var<workgroup> values: array<vec4f, 256>;

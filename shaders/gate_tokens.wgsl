@@ -2,7 +2,7 @@
 #import shared/dispatch.wgsl
 #import shared/tokens.wgsl
 
-@group(0) @binding(1) var<storage, read_write> tokens: array<f32>;
+#bindings
 
 fn sigmoid(x: f32) -> f32 {
     return 1.0 / (1.0 + exp(-x));

@@ -1,20 +1,13 @@
 // From gradients at the signed distances to gradients at the plane features (written over the features) and,
 // for pose refinement, at the sample positions. One invocation a strip of samples.
 #import shared/dispatch.wgsl
-#import shared/params.wgsl
+#import shared/flags.wgsl
 #import shared/rays.wgsl
 #import shared/planes.wgsl
-
-@group(0) @binding(1) var<storage, read> rays: array<Ray>;
-@group(0) @binding(2) var<storage, read> depths: array<f32>;
-@group(0) @binding(3) var<storage, read> planes_geometry: array<vec4f>;
-@group(0) @binding(4) var<storage, read> decoders: array<vec4f>;
-@group(0) @binding(5) var<storage, read> distance_gradient: array<f32>;
-@group(0) @binding(6) var<storage, read_write> features: array<vec4f>;
-@group(0) @binding(7) var<storage, read_write> position_gradient: array<vec4f>;
-
 #import shared/geometry.wgsl
 #import shared/geometry_gradient.wgsl
+
+#bindings
 
 const STRIP: u32 = ${BACKWARD_STRIP}u;
 

@@ -3,9 +3,7 @@
 #import shared/tokens.wgsl
 #import shared/token_layers.wgsl
 
-@group(0) @binding(2) var<storage, read> parameters: array<f32>;
-@group(0) @binding(3) var<storage, read> tokens: array<f32>;
-@group(0) @binding(4) var<storage, read_write> token_gradient: array<f32>;
+#bindings
 
 // Gradient before the rectifier.
 fn delta(at: u32) -> f32 {

@@ -4,10 +4,7 @@
 #import shared/tokens.wgsl
 #import shared/token_layers.wgsl
 
-@group(0) @binding(2) var<storage, read> raw: array<f32>;
-@group(0) @binding(3) var<storage, read> tokens: array<f32>;
-@group(0) @binding(4) var<storage, read_write> token_gradient: array<f32>;
-@group(0) @binding(5) var<storage, read_write> partials: array<f32>;
+#bindings
 
 fn delta(token: u32, o: u32) -> f32 {
     let at = token * params.stride + layer.output + o;

@@ -6,6 +6,8 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 extern crate alloc;
 
+#[macro_use]
+pub mod call;
 pub mod camera;
 pub mod classes;
 pub mod config;
@@ -16,17 +18,19 @@ pub mod engine;
 pub mod field;
 pub mod frame;
 pub mod hash;
+pub mod kernel;
 pub mod kernels;
 pub mod keyframe;
-pub mod layout;
 pub mod mesh;
 pub mod metrics;
 pub mod pose;
 pub mod recording;
 mod safetensors;
 pub mod sequence;
-pub mod shader;
 pub mod slam;
 pub mod synth;
 pub mod track;
 pub mod trajectory_file;
+
+pub use mte_slam_shaders as shaders;
+pub use mte_slam_shaders::{layout, shader};

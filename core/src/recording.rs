@@ -1,7 +1,8 @@
 //! An ordered list of device commands, built without touching a device.
-use crate::kernels::Kernel;
+use crate::kernel::Kernel;
 use alloc::vec::Vec;
 use bytemuck::Pod;
+use core::{fmt, marker::PhantomData};
 
 /// The most workgroups that WebGPU takes in one dimension of a dispatch.
 pub const MAX_WORKGROUPS_PER_DIMENSION: u32 = 65_535;
@@ -9,6 +10,49 @@ pub const MAX_WORKGROUPS_PER_DIMENSION: u32 = 65_535;
 /// Names a buffer of the engine that made it. Never reused within one engine.
 #[derive(Copy, Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct BufferId(pub u32);
+
+/// Names a buffer and what it holds: the elements that shaders declare.
+pub struct Buffer<T> {
+    id: BufferId,
+    elements: PhantomData<fn() -> T>,
+}
+
+impl<T> Buffer<T> {
+    /// A buffer that holds elements of `T`.
+    pub const fn new(id: BufferId) -> Self {
+        Self { id, elements: PhantomData }
+    }
+
+    /// The buffer's name without what it holds.
+    pub const fn id(self) -> BufferId {
+        self.id
+    }
+
+    /// The same buffer for a kernel that takes its words for other elements.
+    pub const fn cast<U>(self) -> Buffer<U> {
+        Buffer::new(self.id)
+    }
+}
+
+impl<T> Copy for Buffer<T> {}
+
+impl<T> Clone for Buffer<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> fmt::Debug for Buffer<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.id.fmt(f)
+    }
+}
+
+impl<T> From<Buffer<T>> for BufferId {
+    fn from(buffer: Buffer<T>) -> BufferId {
+        buffer.id
+    }
+}
 
 /// One step of a recording. Offsets and lengths count 4-byte words.
 #[derive(Clone, Debug)]
@@ -48,7 +92,7 @@ pub enum Command {
     Dispatch {
         /// What to run.
         kernel: &'static Kernel,
-        /// Buffers in the order of `kernel.bindings`.
+        /// Buffers in the order of the kernel's bindings.
         bindings: Vec<BufferId>,
         /// The words of the kernel's parameter struct.
         params: Vec<u32>,
@@ -73,15 +117,16 @@ impl Recording {
 
     /// Writes `data` at `offset_words`. Data whose size is not a multiple of 4 bytes is padded by
     /// zero bytes. Empty data records nothing.
-    pub fn upload<T: Pod>(&mut self, buffer: BufferId, offset_words: usize, data: &[T]) {
-        let data = to_words(data);
+    pub fn upload<T: Pod>(&mut self, buffer: impl Into<BufferId>, offset_words: usize, data: &[T]) {
+        let (buffer, data) = (buffer.into(), to_words(data));
         if !data.is_empty() {
             self.commands.push(Command::Upload { buffer, offset_words, data });
         }
     }
 
     /// Sets `words` words from `offset_words` on to zero.
-    pub fn clear(&mut self, buffer: BufferId, offset_words: usize, words: usize) {
+    pub fn clear(&mut self, buffer: impl Into<BufferId>, offset_words: usize, words: usize) {
+        let buffer = buffer.into();
         if words > 0 {
             self.commands.push(Command::Clear { buffer, offset_words, words });
         }
@@ -90,12 +135,13 @@ impl Recording {
     /// Copies `words` words from `src` to `dst`, which must be different buffers.
     pub fn copy(
         &mut self,
-        src: BufferId,
+        src: impl Into<BufferId>,
         src_offset_words: usize,
-        dst: BufferId,
+        dst: impl Into<BufferId>,
         dst_offset_words: usize,
         words: usize,
     ) {
+        let (src, dst) = (src.into(), dst.into());
         if words > 0 {
             let command = Command::Copy { src, src_offset_words, dst, dst_offset_words, words };
             self.commands.push(command);
@@ -103,7 +149,8 @@ impl Recording {
     }
 
     /// Runs `workgroups` workgroups of `kernel`; records nothing when any count is 0. `bindings`
-    /// follow the order of `kernel.bindings`, `params` is the kernel's parameter struct.
+    /// follow the order of the kernel's, `params` is its parameter struct. Where the kernel is known,
+    /// [`Call`](crate::call::Call) is safer: it names the bindings.
     pub fn dispatch<P: Pod>(
         &mut self,
         kernel: &'static Kernel,
@@ -130,7 +177,7 @@ impl Recording {
         bindings: &[BufferId],
         invocations: usize,
     ) {
-        let workgroups = workgroups_1d(invocations, kernel.workgroup_size);
+        let workgroups = workgroups_1d(invocations, kernel.interface.workgroup_size);
         self.dispatch(kernel, params, bindings, workgroups);
     }
 
@@ -160,7 +207,7 @@ pub fn workgroups_1d(invocations: usize, workgroup_size: u32) -> [u32; 3] {
 }
 
 /// The bytes of `data` as words, padded by zero bytes.
-fn to_words<T: Pod>(data: &[T]) -> Vec<u32> {
+pub(crate) fn to_words<T: Pod>(data: &[T]) -> Vec<u32> {
     let bytes: &[u8] = bytemuck::cast_slice(data);
     let mut words = alloc::vec![0u32; bytes.len().div_ceil(4)];
     bytemuck::cast_slice_mut::<u32, u8>(&mut words)[..bytes.len()].copy_from_slice(bytes);

@@ -37,7 +37,7 @@ pub async fn check_cases(
         return Err(format!("{} cases, {} expected results", cases.len(), expected.len()));
     }
     for (case, expected) in cases.iter().zip(expected) {
-        let name = (case.kernel.name, case.name);
+        let name = (case.kernel.interface.name, case.name);
         let failed = |e: EngineError| format!("{name:?}: {e}");
         let found = run_case(engine, case).await.map_err(failed)?;
         compare_outputs(case.kernel, expected, &found, &Tolerance(case.tolerance.clone()))
@@ -46,7 +46,7 @@ pub async fn check_cases(
             continue;
         }
         let mut dirty = case.buffers.clone();
-        for (binding, words) in case.kernel.bindings.iter().zip(&mut dirty) {
+        for (binding, words) in case.kernel.interface.bindings.iter().zip(&mut dirty) {
             if case.overwritten.contains(&binding.name) {
                 words.iter_mut().enumerate().for_each(|(i, w)| *w = 0x4b1d_0000 ^ i as u32);
             }
@@ -54,7 +54,7 @@ pub async fn check_cases(
         let again = run_words_async(engine, case.kernel, &case.params, &dirty, case.workgroups)
             .await
             .map_err(failed)?;
-        for (i, binding) in case.kernel.bindings.iter().enumerate() {
+        for (i, binding) in case.kernel.interface.bindings.iter().enumerate() {
             if again[i] != found[i] {
                 return Err(format!("{name:?}: {} depends on what was there", binding.name));
             }

@@ -140,7 +140,7 @@ fn features(name: &'static str, o: &Options, slots: u32) -> Case {
         kernel: &SAMPLE_FEATURES,
         params: words(&state.params),
         buffers: state.inputs(&SAMPLE_FEATURES),
-        workgroups: workgroups_1d(n, SAMPLE_FEATURES.workgroup_size),
+        workgroups: workgroups_1d(n, SAMPLE_FEATURES.interface.workgroup_size),
         tolerance: [[unchanged; 4].as_slice(), &[columns(32), columns(1), columns(1)]].concat(),
         overwritten: vec!["features", "slot_depths", "slot_weights"],
     }

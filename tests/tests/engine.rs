@@ -1,54 +1,61 @@
 //! What both engines promise: order, zeroed buffers, large dispatches, typed errors.
 use mte_slam_core::{
     engine::{Engine, EngineError, GpuEngine, GpuOptions, MAX_BUFFER_BYTES, list_adapters},
-    kernels::{Access, Binding, CpuDispatch, Kernel, ParamsLayout, add_i32, load_u32, store_u32},
-    params,
+    kernel::{CpuDispatch, Kernel, add_i32, load_u32, store_u32},
     recording::{BufferId, Recording, workgroups_1d},
+    shaders::{interface::Interface, shared_struct, structs::StructLayout},
 };
 use mte_slam_tests::{TestRandom, gpu_engine, gpu_engine_with};
 use pollster::block_on;
 
-params! {
+/// A kernel that is declared outside of the crates.
+mod affine {
+    use super::{TestParams, affine_twin};
+    use mte_slam_core::{kernel, shaders::interface};
+
+    interface! {
+        /// values\[i\] = values\[i\] * factors\[i % 4\] + source\[0\], and counts the invocations.
+        pub affine {
+            wgsl: "#import shared/dispatch.wgsl
+                #bindings
+                @compute @workgroup_size(WORKGROUP_SIZE)
+                fn main(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>,
+                    @builtin(local_invocation_index) l: u32) {
+                    let i = linear_invocation(w, n, l);
+                    if (i < params.count) {
+                        values[i] = values[i] * params.factors[i % 4u] + source[0];
+                        atomicAdd(&counter[0], 1);
+                    }
+                }",
+            workgroup_size: 64,
+            params: TestParams,
+            bindings: {
+                /// What is added.
+                source: Read<u32>,
+                /// What is changed.
+                values: ReadWrite<u32>,
+                /// Number of invocations that changed something.
+                counter: Atomic<i32>,
+            }
+        }
+    }
+    kernel! { pub static AFFINE = self, affine_twin }
+}
+use affine::{AFFINE, Views};
+
+shared_struct! {
     /// Parameters of the test kernels.
     pub struct TestParams {
         /// A factor by component.
         factors: [u32; 4],
-        /// Words of `target`.
+        /// Words of `values`.
         count: u32,
     }
 }
 
-/// target\[i\] = target\[i\] * factors\[i % 4\] + source\[0\], and counts the invocations.
-static AFFINE: Kernel = Kernel {
-    name: "affine",
-    wgsl: "#import shared/dispatch.wgsl
-        struct Params { factors: vec4<u32>, count: u32 }
-        @group(0) @binding(0) var<uniform> params: Params;
-        @group(0) @binding(1) var<storage, read> source: array<u32>;
-        @group(0) @binding(2) var<storage, read_write> values: array<u32>;
-        @group(0) @binding(3) var<storage, read_write> counter: array<atomic<i32>>;
-        @compute @workgroup_size(WORKGROUP_SIZE)
-        fn main(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>,
-            @builtin(local_invocation_index) l: u32) {
-            let i = linear_invocation(w, n, l);
-            if (i < params.count) {
-                values[i] = values[i] * params.factors[i % 4u] + source[0];
-                atomicAdd(&counter[0], 1);
-            }
-        }",
-    workgroup_size: 64,
-    bindings: &[
-        Binding { name: "source", access: Access::Read },
-        Binding { name: "values", access: Access::ReadWrite },
-        Binding { name: "counter", access: Access::ReadWrite },
-    ],
-    params: &TestParams::LAYOUT,
-    twin: affine,
-};
-
-fn affine(dispatch: &CpuDispatch<'_>) {
+fn affine_twin(dispatch: &CpuDispatch<'_>) {
     let p: TestParams = dispatch.params();
-    let (source, values, counter) = (dispatch.read_u32(0), dispatch.write(1), dispatch.write(2));
+    let Views { source, values, counter } = dispatch.views();
     dispatch.for_each_invocation(|i| {
         if i < p.count as usize {
             let value = load_u32(&values[i]).wrapping_mul(p.factors[i % 4]);
@@ -58,25 +65,24 @@ fn affine(dispatch: &CpuDispatch<'_>) {
     });
 }
 
+/// A kernel without bindings.
+const fn bare(name: &'static str, wgsl: &'static str) -> Interface {
+    const NONE: StructLayout = StructLayout { name: "None", fields: &[], size: 0 };
+    Interface { name, wgsl, workgroup_size: 1, bindings: &[], params: &NONE }
+}
+
 /// A kernel whose shader is not valid.
 static BROKEN: Kernel = Kernel {
-    name: "broken",
-    wgsl: "@compute @workgroup_size(1) fn main() { let x: f32 = 1u; }",
-    workgroup_size: 1,
-    bindings: &[],
-    params: &ParamsLayout { name: "None", fields: &[], size: 0 },
+    interface: &bare(
+        "broken",
+        "#bindings\n@compute @workgroup_size(1) fn main() { let x: f32 = 1u; }",
+    ),
     twin: |_| {},
 };
 
 /// A kernel whose shader has an unknown constant.
-static UNKNOWN: Kernel = Kernel {
-    name: "unknown",
-    wgsl: "const A = ${NOPE};",
-    workgroup_size: 1,
-    bindings: &[],
-    params: &ParamsLayout { name: "None", fields: &[], size: 0 },
-    twin: |_| {},
-};
+static UNKNOWN: Kernel =
+    Kernel { interface: &bare("unknown", "#bindings\nconst A = ${NOPE};"), twin: |_| {} };
 
 /// Runs a test on the CPU engine and, where there is one, on the GPU engine.
 fn on_both(test: impl Fn(&mut Engine)) {

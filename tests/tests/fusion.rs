@@ -10,10 +10,9 @@ use mte_slam_core::{
         shared::{FLAG_ANCHORS, FLAG_DENSE, FLAG_GUIDED, FLAG_MAP},
         tokens::{APPEARANCE_AT, COLOR_AT, NO_BIAS, SEMANTIC_AT},
     },
-    layout::{
-        ANCHOR_FLOATS, GEOMETRY_FLOATS, HEAD_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_ANCHOR,
-    },
+    layout::{ANCHOR_FLOATS, HEAD_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_ANCHOR},
     recording::{BufferId, Recording},
+    shaders::decoders::SEMANTIC,
 };
 use mte_slam_tests::{
     TestRandom, f32_words,
@@ -447,8 +446,12 @@ fn gradients_of_anchors_and_fused_features() {
             read(&mut d, t.moment1, t.floats).iter().map(|m| m * 10.0).collect()
         });
         assert!(geometry.iter().chain(&appearance).all(|g| *g == 0.0), "{name}");
-        let s = GEOMETRY_FLOATS;
-        assert!(decoders[..s + 1188].iter().chain(&decoders[HEAD_FLOATS..]).all(|g| *g == 0.0));
+        assert!(
+            decoders[..SEMANTIC[0].weights]
+                .iter()
+                .chain(&decoders[HEAD_FLOATS..])
+                .all(|g| *g == 0.0)
+        );
         let fine = d.shape.surface[1][3] as usize * 16;
         let mut loss = |d: &mut Device| ray_loss(d, &b);
         for (part, range) in [("coarse planes", 0..fine), ("fine planes", fine..semantic.len())] {
@@ -456,10 +459,10 @@ fn gradients_of_anchors_and_fused_features() {
             check(&mut d, tensors[2].values, &semantic, range, &name, &mut loss);
         }
         for (part, range) in [
-            ("layer 1", s + 1188..s + 2212),
-            ("bias 1", s + 2212..s + 2244),
-            ("layer 2", s + 2244..s + 2756),
-            ("bias 2", s + 2756..s + 2772),
+            ("layer 1", SEMANTIC[0].weight_range()),
+            ("bias 1", SEMANTIC[0].bias_range()),
+            ("layer 2", SEMANTIC[1].weight_range()),
+            ("bias 2", SEMANTIC[1].bias_range()),
         ] {
             let name = format!("{name}: {part}");
             check(&mut d, tensors[3].values, &decoders, range, &name, &mut loss);

@@ -17,9 +17,10 @@ use mte_slam_core::{
         sample_rays::SAMPLE_RAYS,
         shared::{FLAG_GUIDED, FLAG_MAP, FLAG_POSE},
     },
-    layout::{GEOMETRY_FLOATS, HEAD_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS},
+    layout::{HEAD_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_POSE},
     pose::Pose,
     recording::Recording,
+    shaders::decoders::{COLOR, GEOMETRY, SEMANTIC},
 };
 use mte_slam_tests::{
     TestRandom,
@@ -243,13 +244,14 @@ fn geometry_planes_and_decoder() {
     let fine = d.shape.geometry[1][3] as usize * 16;
     check(&mut problem, planes, &geometry, 0..fine, "coarse geometry planes");
     check(&mut problem, planes, &geometry, fine..geometry.len(), "fine geometry planes");
+    let [first, second, last] = GEOMETRY;
     for (name, part) in [
-        ("geometry layer 1", 0..512),
-        ("geometry bias 1", 512..528),
-        ("geometry layer 2", 528..784),
-        ("geometry bias 2", 784..800),
-        ("geometry layer 3", 800..816),
-        ("geometry bias 3", 816..817),
+        ("geometry layer 1", first.weight_range()),
+        ("geometry bias 1", first.bias_range()),
+        ("geometry layer 2", second.weight_range()),
+        ("geometry bias 2", second.bias_range()),
+        ("geometry layer 3", last.weight_range()),
+        ("geometry bias 3", last.bias_range()),
     ] {
         check(&mut problem, weights, &decoders, part, name);
     }
@@ -263,12 +265,11 @@ fn appearance_and_colour_decoder() {
     let fine = problem.device.shape.surface[1][3] as usize * 16;
     check(&mut problem, planes, &appearance, 0..fine, "coarse appearance planes");
     check(&mut problem, planes, &appearance, fine..appearance.len(), "fine appearance planes");
-    let s = GEOMETRY_FLOATS;
     for (name, part) in [
-        ("colour layer 1", s..s + 1024),
-        ("colour bias 1", s + 1024..s + 1056),
-        ("colour layer 2", s + 1056..s + 1184),
-        ("colour bias 2", s + 1184..s + 1188),
+        ("colour layer 1", COLOR[0].weight_range()),
+        ("colour bias 1", COLOR[0].bias_range()),
+        ("colour layer 2", COLOR[1].weight_range()),
+        ("colour bias 2", COLOR[1].bias_range()),
     ] {
         check(&mut problem, weights, &decoders, part, name);
     }
@@ -282,13 +283,13 @@ fn semantic_planes_decoder_and_head() {
     let fine = problem.device.shape.surface[1][3] as usize * 16;
     check(&mut problem, planes, &semantic, 0..fine, "coarse semantic planes");
     check(&mut problem, planes, &semantic, fine..semantic.len(), "fine semantic planes");
-    let (s, head) = (GEOMETRY_FLOATS, HEAD_FLOATS);
+    let head = HEAD_FLOATS;
     let bias = head + CLASSES as usize * 16;
     for (name, part) in [
-        ("semantic layer 1", s + 1188..s + 2212),
-        ("semantic bias 1", s + 2212..s + 2244),
-        ("semantic layer 2", s + 2244..s + 2756),
-        ("semantic bias 2", s + 2756..s + 2772),
+        ("semantic layer 1", SEMANTIC[0].weight_range()),
+        ("semantic bias 1", SEMANTIC[0].bias_range()),
+        ("semantic layer 2", SEMANTIC[1].weight_range()),
+        ("semantic bias 2", SEMANTIC[1].bias_range()),
         ("class head", head..bias),
         ("class head's bias", bias..bias + CLASSES as usize),
     ] {
@@ -326,7 +327,7 @@ fn per_sample_head_and_semantic_planes() {
     check(&mut problem, planes, &semantic, 0..fine, "coarse semantic planes");
     check(&mut problem, planes, &semantic, fine..semantic.len(), "fine semantic planes");
     // The ray's decoders of classes rest; geometry gets what it gets without classes.
-    assert!(decoders[GEOMETRY_FLOATS + 1188..].iter().all(|g| *g == 0.0));
+    assert!(decoders[SEMANTIC[0].weights..].iter().all(|g| *g == 0.0));
     let mut without = Problem::new(Engine::cpu(), LossConfig { semantic: 0.0, ..losses() });
     without.rays_per_frame = problem.rays_per_frame;
     assert!(without.gradients()[0] == geometry);
@@ -348,7 +349,7 @@ fn semantic_gradients_stop_at_the_weights() {
     let mut problem = Problem::new(Engine::cpu(), only);
     let [geometry, appearance, semantic, decoders] = problem.gradients();
     assert!(geometry.iter().chain(&appearance).all(|g| *g == 0.0));
-    assert!(decoders[..GEOMETRY_FLOATS + 1188].iter().all(|g| *g == 0.0));
+    assert!(decoders[..SEMANTIC[0].weights].iter().all(|g| *g == 0.0));
     assert!(semantic.iter().any(|g| *g != 0.0));
     let state = block_on(problem.device.read_pose_state(0)).unwrap();
     assert!(state[26..32].iter().all(|g| *g == 0.0), "{state:?}");
@@ -445,7 +446,7 @@ fn rays_without_depth_teach_colour() {
     let mut pose_gradient = [0.0; 6];
     for ray in state.floats("ray_state").chunks_exact(RAY_STATE_FLOATS).skip(rays).take(rays) {
         for k in 0..3 {
-            pose_gradient[k] += f64::from(ray[296 + k]);
+            pose_gradient[k] += f64::from(ray[STATE_POSE as usize * 4 + k]);
             pose_gradient[3 + k] += f64::from(ray[300 + k]);
         }
     }

@@ -11,6 +11,7 @@ use mte_slam_core::{
     },
     layout::{CHANNELS, RAY_STATE_FLOATS, STATE_DEPTH},
     recording::Recording,
+    shaders::decoders::GEOMETRY,
 };
 use mte_slam_tests::{
     f32_words,
@@ -75,8 +76,9 @@ fn wall(state: &mut State, wall_m: f32) {
     let mut w = vec![0.0; state.buffers["decoders"].len()];
     // relu(x) - relu(-x) through both hidden layers.
     (w[0], w[1]) = (1.0, -1.0);
-    (w[528], w[528 + 17]) = (1.0, 1.0);
-    (w[800], w[801]) = (1.0, -1.0);
+    let [_, second, last] = GEOMETRY.map(|layer| layer.weights);
+    (w[second], w[second + 17]) = (1.0, 1.0);
+    (w[last], w[last + 1]) = (1.0, -1.0);
     state.buffers.insert("planes_geometry", f32_words(planes));
     state.buffers.insert("decoders", f32_words(w));
 }

@@ -61,8 +61,7 @@ async fn engine(settings: &Settings) -> Result<(Engine, Option<String>), Failure
         return Ok((Engine::cpu(), None));
     }
     let failure = if has_webgpu() {
-        let overrides = if settings.unroll { Vec::new() } else { vec![("UNROLL", 0)] };
-        match Engine::gpu(GpuOptions { overrides, ..GpuOptions::default() }).await {
+        match Engine::gpu(GpuOptions::default()).await {
             Ok(engine) => return Ok((engine, None)),
             Err(e) => Failure::from(e),
         }
@@ -164,8 +163,7 @@ impl Run {
         settings: Settings,
         saved: SavedRun,
     ) -> Result<Run, Failure> {
-        let Settings { engine, unroll, .. } = settings;
-        let settings = Settings { engine, unroll, ..saved.progress.settings.clone() };
+        let settings = Settings { engine: settings.engine, ..saved.progress.settings.clone() };
         let mut run = Run::begin(source, settings, Some(&saved)).await?;
         let SavedRun { progress: state, checkpoint } = saved;
         drop(checkpoint);

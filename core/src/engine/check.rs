@@ -120,31 +120,31 @@ impl<T> Table<T> {
                 }
             }
             Command::Dispatch { kernel, ref bindings, ref params, workgroups } => {
-                let name = kernel.name;
-                if bindings.len() != kernel.bindings.len() {
+                let name = kernel.interface.name;
+                if bindings.len() != kernel.interface.bindings.len() {
                     return Err(EngineError::BindingCount {
                         kernel: name,
-                        expected: kernel.bindings.len(),
+                        expected: kernel.interface.bindings.len(),
                         found: bindings.len(),
                     });
                 }
                 for (i, id) in bindings.iter().enumerate() {
                     let entry = self.get(*id, || {
-                        format!("kernel {name}, binding {}", kernel.bindings[i].name)
+                        format!("kernel {name}, binding {}", kernel.interface.bindings[i].name)
                     })?;
                     if let Some(first) = bindings[..i].iter().position(|other| other == id) {
                         return Err(EngineError::BoundTwice {
                             kernel: name,
                             buffer: entry.name,
-                            first: kernel.bindings[first].name,
-                            second: kernel.bindings[i].name,
+                            first: kernel.interface.bindings[first].name,
+                            second: kernel.interface.bindings[i].name,
                         });
                     }
                 }
-                if 4 * params.len() != kernel.params.size {
+                if 4 * params.len() != kernel.interface.params.size {
                     return Err(EngineError::ParamsSize {
                         kernel: name,
-                        expected: kernel.params.size,
+                        expected: kernel.interface.params.size,
                         found: 4 * params.len(),
                     });
                 }

@@ -10,12 +10,10 @@ pub use cpu::CpuEngine;
 #[cfg(feature = "gpu")]
 pub use gpu::{AdapterDescription, GpuEngine, GpuOptions, list_adapters};
 
-use crate::{
-    recording::{BufferId, Recording},
-    shader::ShaderError,
-};
+use crate::recording::{Buffer, BufferId, Recording};
 use alloc::{string::String, vec::Vec};
 use bytemuck::Pod;
+use mte_slam_shaders::shader::ShaderError;
 
 /// Largest buffer \[bytes\]: the storage binding that WebGPU grants everywhere.
 pub const MAX_BUFFER_BYTES: u64 = 128 << 20;
@@ -236,8 +234,19 @@ impl Engine {
         either!(self, engine => engine.create_buffer(name, words))
     }
 
+    /// As [`create_buffer`](Self::create_buffer), of a buffer that holds elements of `T`. The size is
+    /// in words all the same.
+    pub fn create<T>(
+        &mut self,
+        name: &'static str,
+        words: usize,
+    ) -> Result<Buffer<T>, EngineError> {
+        self.create_buffer(name, words).map(Buffer::new)
+    }
+
     /// Frees a buffer; unknown names are ignored.
-    pub fn destroy_buffer(&mut self, buffer: BufferId) {
+    pub fn destroy_buffer(&mut self, buffer: impl Into<BufferId>) {
+        let buffer = buffer.into();
         either!(self, engine => engine.destroy_buffer(buffer))
     }
 
@@ -250,10 +259,11 @@ impl Engine {
     /// Reads words back after all submitted work.
     pub async fn read(
         &mut self,
-        buffer: BufferId,
+        buffer: impl Into<BufferId>,
         offset_words: usize,
         words: usize,
     ) -> Result<Vec<u32>, EngineError> {
+        let buffer = buffer.into();
         match self {
             Engine::Cpu(engine) => engine.read(buffer, offset_words, words),
             #[cfg(feature = "gpu")]
@@ -264,7 +274,7 @@ impl Engine {
     /// Reads `count` elements from word `offset_words` on, after all submitted work.
     pub async fn read_as<T: Pod>(
         &mut self,
-        buffer: BufferId,
+        buffer: impl Into<BufferId>,
         offset_words: usize,
         count: usize,
     ) -> Result<Vec<T>, EngineError> {

@@ -373,7 +373,7 @@ fn measure(
                 device.engine.submit(&Recording { commands: vec![command] })?;
                 continue;
             };
-            let kernel = kernel.name;
+            let kernel = kernel.interface.name;
             let begin = Instant::now();
             device.engine.submit(&Recording { commands: vec![command] })?;
             block_on(device.engine.synchronise())?;
@@ -470,7 +470,7 @@ fn measure_semantic_path(
             let kind = if *train { Kind::Mapping } else { Kind::Classes };
             record(device, config, kind, round as u32 + 1, &mut r);
             r.commands.retain(|command| match command {
-                Command::Dispatch { kernel, .. } => kernels.contains(&kernel.name),
+                Command::Dispatch { kernel, .. } => kernels.contains(&kernel.interface.name),
                 _ => true,
             });
             let begin = Instant::now();

@@ -143,7 +143,7 @@ impl Group {
     /// Workgroups for as many invocations as the layer with most has.
     pub fn workgroups(&self, invocations: impl Fn(&TokenLayer) -> usize) -> [u32; 3] {
         let most = self.layers.iter().map(invocations).max().unwrap_or(0);
-        let [x, y, _] = workgroups_1d(most, TOKEN_LAYER.workgroup_size);
+        let [x, y, _] = workgroups_1d(most, TOKEN_LAYER.interface.workgroup_size);
         [x, y, self.layers.len() as u32]
     }
 }

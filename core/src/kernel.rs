@@ -1,7 +1,28 @@
-//! What a kernel's Rust twin sees of a dispatch.
+//! A kernel with its Rust twin, and what the twin sees of a dispatch.
 use alloc::vec::Vec;
 use bytemuck::Pod;
-use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use core::{
+    fmt,
+    marker::PhantomData,
+    slice,
+    sync::atomic::{AtomicU32, Ordering::Relaxed},
+};
+use mte_slam_shaders::interface::{BindingSet, Element, Interface, Role, Source};
+
+/// A kernel: its interface, whose shader runs on a device, and the same computation in Rust.
+/// [`kernel!`](crate::kernel!) makes it.
+pub struct Kernel {
+    /// Shader, bindings, parameters.
+    pub interface: &'static Interface,
+    /// The same computation in Rust.
+    pub twin: fn(&CpuDispatch<'_>),
+}
+
+impl fmt::Debug for Kernel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Kernel").field("name", &self.interface.name).finish_non_exhaustive()
+    }
+}
 
 /// A bound buffer.
 #[derive(Copy, Clone, Debug)]
@@ -16,7 +37,7 @@ pub enum CpuBinding<'a> {
 pub struct CpuDispatch<'a> {
     /// Workgroups in x, y and z.
     pub workgroups: [u32; 3],
-    /// Invocations a workgroup.
+    /// Invocations per workgroup.
     pub workgroup_size: u32,
     params: &'a [u32],
     bindings: Vec<CpuBinding<'a>>,
@@ -33,48 +54,17 @@ impl<'a> CpuDispatch<'a> {
         Self { workgroups, workgroup_size, params, bindings }
     }
 
-    /// The parameter struct. A struct of another size than recorded (a mistake in the kernel's
-    /// registration) reads as zeros.
+    /// The parameter struct. A struct of another size than recorded (another kernel's) reads
+    /// as zeros.
     pub fn params<P: Pod>(&self) -> P {
         let bytes: &[u8] = bytemuck::cast_slice(self.params);
         debug_assert!(bytes.len() >= size_of::<P>(), "parameter struct of another kernel");
         bytes.get(..size_of::<P>()).map_or_else(P::zeroed, bytemuck::pod_read_unaligned)
     }
 
-    fn read<T: Pod>(&self, i: usize) -> &'a [T] {
-        match self.bindings.get(i) {
-            Some(CpuBinding::Read(words)) => bytemuck::try_cast_slice(words).unwrap_or(&[]),
-            other => {
-                debug_assert!(false, "binding {i} is not bound for reading: {}", other.is_some());
-                &[]
-            }
-        }
-    }
-
-    /// Binding `i` (counted from 0) as u32, bound for reading only.
-    pub fn read_u32(&self, i: usize) -> &'a [u32] {
-        self.read(i)
-    }
-
-    /// Binding `i` as i32, bound for reading only.
-    pub fn read_i32(&self, i: usize) -> &'a [i32] {
-        self.read(i)
-    }
-
-    /// Binding `i` as f32, bound for reading only.
-    pub fn read_f32(&self, i: usize) -> &'a [f32] {
-        self.read(i)
-    }
-
-    /// Binding `i`, bound for reading and writing.
-    pub fn write(&self, i: usize) -> &'a [AtomicU32] {
-        match self.bindings.get(i) {
-            Some(CpuBinding::ReadWrite(words)) => words,
-            other => {
-                debug_assert!(false, "binding {i} is not bound for writing: {}", other.is_some());
-                &[]
-            }
-        }
+    /// The buffers by the names of the kernel's bindings.
+    pub fn views<B: BindingSet<Slices<'a>>>(&self) -> B {
+        B::take(&mut Bound(self.bindings.iter()))
     }
 
     /// Number of invocations of the whole dispatch, at least 1.
@@ -107,6 +97,60 @@ impl<'a> CpuDispatch<'a> {
             }
         });
     }
+}
+
+/// Stands for bindings in a twin: slices of what the buffers hold. Buffers that the kernel writes are
+/// words that invocations share, see [`load_f32`] and its like.
+pub struct Slices<'a>(PhantomData<&'a ()>);
+
+impl<'a> Role for Slices<'a> {
+    type Read<T: Element> = &'a [T::Host];
+    type ReadWrite<T: Element> = &'a [AtomicU32];
+    type Atomic<T: Element> = &'a [AtomicU32];
+}
+
+/// The buffers of a dispatch that are not yet taken.
+struct Bound<'d, 'a>(slice::Iter<'d, CpuBinding<'a>>);
+
+impl<'a> Bound<'_, 'a> {
+    fn words(&mut self) -> &'a [u32] {
+        match self.0.next() {
+            Some(CpuBinding::Read(words)) => words,
+            other => {
+                debug_assert!(false, "not bound for reading only: {other:?}");
+                &[]
+            }
+        }
+    }
+
+    fn atomics(&mut self) -> &'a [AtomicU32] {
+        match self.0.next() {
+            Some(CpuBinding::ReadWrite(words)) => words,
+            other => {
+                debug_assert!(false, "not bound for writing: {other:?}");
+                &[]
+            }
+        }
+    }
+}
+
+impl<'a> Source<Slices<'a>> for Bound<'_, 'a> {
+    fn read<T: Element>(&mut self) -> &'a [T::Host] {
+        elements(self.words())
+    }
+    fn read_write<T: Element>(&mut self) -> &'a [AtomicU32] {
+        self.atomics()
+    }
+    fn atomic<T: Element>(&mut self) -> &'a [AtomicU32] {
+        self.atomics()
+    }
+}
+
+/// The whole elements that `words` hold: buffers are rounded up to 4 words.
+fn elements<T: Pod>(words: &[u32]) -> &[T] {
+    let size = size_of::<T>() / 4;
+    let whole = words.len() - words.len() % size.max(1);
+    bytemuck::try_cast_slice(&words[..whole]).unwrap_or(&[])
 }
 
 /// The f32 in a word.

@@ -1,15 +1,12 @@
-//! The WGSL preprocessor: imports, constants, unrolled loops and conditions.
+//! The WGSL preprocessor: declarations of bindings, imports, constants, loops and conditions.
 //!
-//! Directives stand on lines of their own: `#import shared/NAME.wgsl` (each file at most once),
+//! Directives stand on lines of their own: `#bindings`, once in each kernel, becomes the declarations
+//! of its parameters and bindings; `#import shared/NAME.wgsl` (each file at most once),
 //! `#for k in A..B` ... `#end`, `#if EXPRESSION` ... `#else` ... `#end`. In all other lines
 //! `${EXPRESSION}` becomes a number, and the word `WORKGROUP_SIZE` becomes the kernel's `256u`
 //! style literal. Expressions are integer arithmetic (`+ - * / %`, comparisons, `&& || !`,
 //! parentheses) on literals, loop variables and [`CONSTANTS`].
-#[doc(hidden)]
-pub mod embed;
-mod expression;
-
-use crate::{kernels::Kernel, layout::CONSTANTS};
+use crate::{constants::CONSTANTS, expression, header::header, interface::Interface};
 use alloc::{
     string::{String, ToString},
     vec::Vec,
@@ -17,7 +14,7 @@ use alloc::{
 
 macro_rules! shared {
     ($path:literal) => {
-        ($path, crate::embedded_shader!(concat!(env!("CARGO_MANIFEST_DIR"), "/../shaders/", $path)))
+        ($path, crate::embedded_shader!(concat!(env!("CARGO_MANIFEST_DIR"), "/", $path)))
     };
 }
 
@@ -26,12 +23,12 @@ pub const SHARED: &[(&str, &str)] = &[
     shared!("shared/angle.wgsl"),
     shared!("shared/appearance.wgsl"),
     shared!("shared/dispatch.wgsl"),
+    shared!("shared/flags.wgsl"),
     shared!("shared/geometry.wgsl"),
     shared!("shared/geometry_gradient.wgsl"),
     shared!("shared/geometry_mlp.wgsl"),
     shared!("shared/head.wgsl"),
     shared!("shared/lane_sums.wgsl"),
-    shared!("shared/params.wgsl"),
     shared!("shared/planes.wgsl"),
     shared!("shared/random.wgsl"),
     shared!("shared/rays.wgsl"),
@@ -69,15 +66,13 @@ pub enum ShaderError {
 }
 
 /// The WGSL of `kernel` with the constants of [`CONSTANTS`], changed by `overrides`.
-pub fn compose(kernel: &Kernel, overrides: &[(&str, u32)]) -> Result<String, ShaderError> {
-    compose_source(kernel.name, kernel.wgsl, kernel.workgroup_size, SHARED, overrides)
+pub fn compose(kernel: &Interface, overrides: &[(&str, u32)]) -> Result<String, ShaderError> {
+    compose_with(kernel, SHARED, overrides)
 }
 
-/// As [`compose`], for a source that is not in the registry, with its own importable files.
-pub fn compose_source(
-    name: &str,
-    source: &str,
-    workgroup_size: u32,
+/// As [`compose`], with importable files of the caller's.
+pub fn compose_with(
+    kernel: &Interface,
     shared: &[(&str, &str)],
     overrides: &[(&str, u32)],
 ) -> Result<String, ShaderError> {
@@ -95,16 +90,22 @@ pub fn compose_source(
             }
         }
     }
-    names.push(("WORKGROUP_SIZE".into(), i64::from(workgroup_size)));
+    names.push(("WORKGROUP_SIZE".into(), i64::from(kernel.workgroup_size)));
     let mut composer = Composer {
+        kernel,
         shared,
         names,
         imported: Vec::new(),
+        declared: false,
         iterations: 0,
-        workgroup_size: alloc::format!("{workgroup_size}u"),
-        out: String::with_capacity(2 * source.len()),
+        workgroup_size: alloc::format!("{}u", kernel.workgroup_size),
+        out: String::with_capacity(2 * kernel.wgsl.len()),
     };
-    composer.file(name, source)?;
+    composer.file(kernel.name, kernel.wgsl)?;
+    if !composer.declared {
+        let line = Line { file: kernel.name, number: 1, text: "" };
+        return Err(line.error("no #bindings in the kernel"));
+    }
     Ok(composer.out)
 }
 
@@ -131,10 +132,13 @@ impl Line<'_> {
 }
 
 struct Composer<'s> {
+    kernel: &'s Interface,
     shared: &'s [(&'s str, &'s str)],
     /// Visible names; later entries hide earlier ones.
     names: Vec<(String, i64)>,
     imported: Vec<&'s str>,
+    /// Whether the bindings have been declared.
+    declared: bool,
     iterations: i64,
     workgroup_size: String,
     out: String,
@@ -157,6 +161,7 @@ impl Composer<'_> {
             match line.directive() {
                 None => self.text(line)?,
                 Some(("import", name)) => self.import(line, name)?,
+                Some(("bindings", "")) => self.bindings(line)?,
                 Some(("for", header)) => {
                     let (body, rest) = (i, end_of_block(lines, i, line)?);
                     if rest.otherwise.is_some() {
@@ -177,12 +182,21 @@ impl Composer<'_> {
                 }
                 Some((word, _)) => {
                     let problem = alloc::format!(
-                        "#{word} here: expected #import, #for or #if, or an #if or #for before it"
+                        "#{word} here: expected #bindings, #import, #for or #if, or an #if or #for before it"
                     );
                     return Err(line.error(problem));
                 }
             }
         }
+        Ok(())
+    }
+
+    fn bindings(&mut self, line: &Line<'_>) -> Result<(), ShaderError> {
+        if self.declared {
+            return Err(line.error("a second #bindings"));
+        }
+        self.declared = true;
+        self.out.push_str(&header(self.kernel));
         Ok(())
     }
 
@@ -299,6 +313,7 @@ fn end_of_block(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::structs::StructLayout;
 
     const FILES: &[(&str, &str)] = &[
         ("shared/a.wgsl", "// a\n#import shared/b.wgsl\n"),
@@ -306,8 +321,19 @@ mod tests {
         ("shared/bad.wgsl", "fine\n${NOPE}\n"),
     ];
 
+    /// A kernel without parameters and bindings, so that nothing stands for `#bindings`.
+    fn kernel(source: &str) -> Interface {
+        Interface {
+            name: "test",
+            wgsl: alloc::boxed::Box::leak(alloc::format!("{source}\n#bindings").into()),
+            workgroup_size: 64,
+            bindings: &[],
+            params: &StructLayout { name: "None", fields: &[], size: 0 },
+        }
+    }
+
     fn run(source: &str) -> Result<String, ShaderError> {
-        compose_source("test", source, 64, FILES, &[])
+        compose_with(&kernel(source), FILES, &[])
     }
 
     /// The error's file, line and text.
@@ -324,18 +350,17 @@ mod tests {
                     MY_WORKGROUP_SIZE ${WORKGROUP_SIZE}";
         let expected = "a[33] 0 @workgroup_size(64u) MY_WORKGROUP_SIZE 64\n";
         assert_eq!(run(text).unwrap(), expected);
-        let changed = compose_source("t", "${CHANNELS}", 1, FILES, &[("CHANNELS", 4)]);
+        let changed = compose_with(&kernel("${CHANNELS}"), FILES, &[("CHANNELS", 4)]);
         assert_eq!(changed.unwrap(), "4\n");
     }
 
     #[test]
     fn loops_nest_and_conditions_choose() {
         let text = "#for k in 0..LEVELS\n#for j in k..2\nx${k}${j*10}\n#end\n#end\n\
-                    #if UNROLL == 1\nunrolled\n#else\nloop\n#end\n\
+                    #if CHANNELS == 16\nequal\n#else\nother\n#end\n\
                     #for k in 0..3\n#if k > 1\nbig ${k}\n#else\n#if k == 0\nzero\n#end\n#end\n#end";
-        assert_eq!(run(text).unwrap(), "x00\nx010\nx110\nunrolled\nzero\nbig 2\n");
-        let plain =
-            compose_source("t", "#if UNROLL\na\n#else\nb\n#end", 1, FILES, &[("UNROLL", 0)]);
+        assert_eq!(run(text).unwrap(), "x00\nx010\nx110\nequal\nzero\nbig 2\n");
+        let plain = compose_with(&kernel("#if LEVELS\na\n#else\nb\n#end"), FILES, &[("LEVELS", 0)]);
         assert_eq!(plain.unwrap(), "b\n");
         assert_eq!(run("#for k in 3..1\nx\n#end").unwrap(), "");
     }
@@ -360,20 +385,21 @@ mod tests {
         assert!(problem("#for 0..2\n#end").2.contains("#for NAME in"));
         assert!(problem("#for k in 0..1000000\nx\n#end").2.contains("iterations"));
         assert!(problem("#while 1").2.contains("#while"));
+        assert_eq!(problem("x\n#bindings").1, 3);
+        let undeclared = Interface { wgsl: "x", ..kernel("") };
+        assert!(compose_with(&undeclared, FILES, &[]).is_err());
         assert!(problem("${1").2.contains("without"));
         assert!(matches!(
-            compose_source("t", "", 1, FILES, &[("CHANELS", 4)]),
+            compose_with(&kernel(""), FILES, &[("CHANELS", 4)]),
             Err(ShaderError::UnknownOverride { name, .. }) if name == "CHANELS"
         ));
     }
 
     #[test]
     fn every_registered_kernel_composes() {
-        for kernel in crate::kernels::all() {
-            for unroll in [0, 1] {
-                let text = compose(kernel, &[("UNROLL", unroll)]).unwrap();
-                assert!(text.contains("fn main") && !text.contains("${"), "{}", kernel.name);
-            }
+        for kernel in crate::kernels::ALL {
+            let text = compose(kernel, &[]).unwrap();
+            assert!(text.contains("fn main") && !text.contains("${"), "{}", kernel.name);
         }
     }
 }

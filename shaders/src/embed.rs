@@ -84,10 +84,17 @@ macro_rules! embedded_shader {
 macro_rules! embedded_shader {
     ($path:expr) => {{
         const SOURCE: &str = include_str!($path);
-        const LENGTH: usize = $crate::shader::embed::bare_length(SOURCE);
-        static BARE: [u8; LENGTH] = $crate::shader::embed::bare(SOURCE);
-        $crate::shader::embed::text(&BARE)
+        const LENGTH: usize = $crate::embed::bare_length(SOURCE);
+        static BARE: [u8; LENGTH] = $crate::embed::bare(SOURCE);
+        $crate::embed::text(&BARE)
     }};
+}
+
+/// The text of one of this package's kernels by name.
+macro_rules! shader {
+    ($name:literal) => {
+        $crate::embedded_shader!(concat!(env!("CARGO_MANIFEST_DIR"), "/", $name, ".wgsl"))
+    };
 }
 
 #[cfg(test)]
@@ -113,7 +120,7 @@ mod tests {
 
     #[test]
     fn every_shader_says_the_same_in_fewer_bytes() {
-        let sources = kernels::all().iter().map(|k| k.wgsl).chain(SHARED.iter().map(|s| s.1));
+        let sources = kernels::ALL.iter().map(|k| k.wgsl).chain(SHARED.iter().map(|s| s.1));
         for source in sources {
             let words = |text: &str| -> Vec<String> {
                 let code = text.lines().map(|l| l.split_once("//").map_or(l, |(code, _)| code));

@@ -1,12 +1,12 @@
 //! Layouts and constants that shaders and twins share.
-use crate::params;
+use crate::decoders;
 
 /// Floats of the geometry decoder in the decoder buffer.
-pub const GEOMETRY_FLOATS: usize = 205 * 4;
+pub const GEOMETRY_FLOATS: usize = decoders::COLOR[0].weights;
 /// Floats of the colour and semantic decoders, behind it.
-pub const SURFACE_FLOATS: usize = 693 * 4;
+pub const SURFACE_FLOATS: usize = decoders::END - GEOMETRY_FLOATS;
 /// First float of the class head.
-pub const HEAD_FLOATS: usize = GEOMETRY_FLOATS + SURFACE_FLOATS;
+pub const HEAD_FLOATS: usize = decoders::END;
 /// Most stratified samples a ray.
 pub const MAX_STRATIFIED: u32 = 128;
 /// Samples an invocation of geometry_backward goes through.
@@ -63,48 +63,8 @@ pub const TARGET_FLOATS: usize = 20;
 /// Squared distance to an anchor that does not exist.
 pub const NO_DISTANCE: f32 = 1e30;
 
-/// Constants every shader may name as `${NAME}`.
-pub const CONSTANTS: &[(&str, u32)] = &[
-    ("CHANNELS", CHANNELS as u32),
-    ("LEVELS", 2),
-    ("UNROLL", 1),
-    ("SURFACE_VEC4", (GEOMETRY_FLOATS / 4) as u32),
-    ("HEAD_VEC4", (HEAD_FLOATS / 4) as u32),
-    ("BACKWARD_STRIP", BACKWARD_STRIP),
-    ("MAX_STRATIFIED", MAX_STRATIFIED),
-    ("RAY_STATE_VEC4", STATE_END),
-    ("STATE_APPEARANCE", STATE_APPEARANCE),
-    ("STATE_SEMANTIC", STATE_SEMANTIC),
-    ("STATE_COLOR_HIDDEN", STATE_COLOR_HIDDEN),
-    ("STATE_SEMANTIC_HIDDEN", STATE_SEMANTIC_HIDDEN),
-    ("STATE_FEATURE", STATE_FEATURE),
-    ("STATE_COLOR_DELTA", STATE_COLOR_DELTA),
-    ("STATE_FEATURE_DELTA", STATE_FEATURE_DELTA),
-    ("STATE_COLOR_HIDDEN_DELTA", STATE_COLOR_HIDDEN_DELTA),
-    ("STATE_SEMANTIC_HIDDEN_DELTA", STATE_SEMANTIC_HIDDEN_DELTA),
-    ("STATE_APPEARANCE_GRADIENT", STATE_APPEARANCE_GRADIENT),
-    ("STATE_SEMANTIC_GRADIENT", STATE_SEMANTIC_GRADIENT),
-    ("STATE_DEPTH", STATE_DEPTH),
-    ("STATE_POSE", STATE_POSE),
-    ("STATE_ANCHOR", STATE_ANCHOR),
-    ("ANCHOR_VEC4", (ANCHOR_FLOATS / 4) as u32),
-    ("TARGET_VEC4", (TARGET_FLOATS / 4) as u32),
-    ("NO_ANCHOR", NO_ANCHOR),
-    ("BANDS", crate::kernels::tokens::BANDS),
-    ("RAW_PATCH", crate::kernels::tokens::RAW_PATCH),
-    ("RAW_MEMORY", crate::kernels::tokens::RAW_MEMORY),
-    ("RAW_POINT", crate::kernels::tokens::RAW_POINT),
-    ("RAW_MEAN", crate::kernels::tokens::RAW_MEAN),
-    ("RAW_HISTOGRAM", crate::kernels::tokens::RAW_HISTOGRAM),
-    ("GEOMETRY_AT", crate::kernels::tokens::GEOMETRY_AT),
-    ("GATE_AT", crate::kernels::tokens::GATE_AT),
-    ("FUSED_AT", crate::kernels::tokens::FUSED_AT),
-    ("COLOR_AT", crate::kernels::tokens::COLOR_AT),
-    ("LOGITS_AT", crate::kernels::tokens::LOGITS_AT),
-];
-
-params! {
-    /// Parameters of all ray and field kernels (`shaders/shared/params.wgsl`).
+shared_struct! {
+    /// Parameters of all ray and field kernels.
     pub struct FieldParams {
         /// Image width \[pixels\].
         width: u32,

@@ -1,0 +1,101 @@
+//! Typed calls of kernels: buffers by the names of bindings.
+use crate::{
+    kernel::Kernel,
+    recording::{Buffer, BufferId, Command, Recording, to_words, workgroups_1d},
+};
+use alloc::vec::Vec;
+use mte_slam_shaders::interface::{BindingSet, Element, Role, Sink};
+
+/// Stands for bindings in a call: handles of buffers.
+pub struct Handles;
+
+impl Role for Handles {
+    type Read<T: Element> = Buffer<T>;
+    type ReadWrite<T: Element> = Buffer<T>;
+    type Atomic<T: Element> = Buffer<T>;
+}
+
+/// The buffers of a call in binding order.
+struct Ids(Vec<BufferId>);
+
+impl Ids {
+    /// Not inlined: calls have up to 8 buffers.
+    #[inline(never)]
+    fn push(&mut self, id: BufferId) {
+        self.0.push(id);
+    }
+}
+
+impl Sink<Handles> for Ids {
+    fn read<T: Element>(&mut self, binding: Buffer<T>) {
+        self.push(binding.id());
+    }
+    fn read_write<T: Element>(&mut self, binding: Buffer<T>) {
+        self.push(binding.id());
+    }
+    fn atomic<T: Element>(&mut self, binding: Buffer<T>) {
+        self.push(binding.id());
+    }
+}
+
+/// The buffers of a kernel's call, by binding: what [`kernel!`](crate::kernel!) calls `Buffers`.
+pub trait Call: BindingSet<Handles> {
+    /// The kernel that is called.
+    const KERNEL: &'static Kernel;
+
+    /// Records a call of at least `invocations` invocations, in whole workgroups spread over x and y
+    /// (see [`workgroups_1d`]). The kernel must check its linear id against a count of its own.
+    fn record(self, recording: &mut Recording, params: &Self::Params, invocations: usize) {
+        let workgroups = workgroups_1d(invocations, Self::INTERFACE.workgroup_size);
+        self.record_workgroups(recording, params, workgroups);
+    }
+
+    /// Records a call of `workgroups` workgroups; nothing when any count is 0.
+    fn record_workgroups(
+        self,
+        recording: &mut Recording,
+        params: &Self::Params,
+        workgroups: [u32; 3],
+    ) {
+        if workgroups.contains(&0) {
+            return;
+        }
+        let mut ids = Ids(Vec::with_capacity(Self::INTERFACE.bindings.len()));
+        self.give(&mut ids);
+        recording.commands.push(Command::Dispatch {
+            kernel: Self::KERNEL,
+            bindings: ids.0,
+            params: to_words(core::slice::from_ref(params)),
+            workgroups,
+        });
+    }
+}
+
+/// Joins the interface of a kernel (a module with an
+/// [`interface!`](mte_slam_shaders::interface!)) with its twin:
+/// ```text
+/// kernel! { pub static COMPOSITE = mte_slam_shaders::kernels::composite, twin }
+/// ```
+/// `twin` is a `fn(&CpuDispatch<'_>)`. Beside the static stand `Buffers`, the buffers of a call, which
+/// [`Call::record`] records, and `Views`, what the twin sees of them
+/// ([`CpuDispatch::views`](crate::kernel::CpuDispatch::views)).
+#[macro_export]
+macro_rules! kernel {
+    (pub static $id:ident = $($interface:ident)::+, $twin:path) => {
+        #[doc = concat!("`", stringify!($($interface)::+), "` with its twin.")]
+        pub static $id: $crate::kernel::Kernel = $crate::kernel::Kernel {
+            interface: &$($interface)::+::INTERFACE,
+            twin: $twin,
+        };
+
+        /// Buffers of a call.
+        pub type Buffers = $($interface)::+::Bindings<$crate::call::Handles>;
+
+        /// What the twin sees of the buffers.
+        pub type Views<'a> = $($interface)::+::Bindings<$crate::kernel::Slices<'a>>;
+
+        impl $crate::call::Call for Buffers {
+            const KERNEL: &'static $crate::kernel::Kernel = &$id;
+        }
+    };
+}
