@@ -8,29 +8,18 @@ extern crate alloc;
 
 #[macro_use]
 pub mod call;
-pub mod camera;
-pub mod classes;
 pub mod config;
-#[cfg(feature = "dataset")]
-pub mod dataset;
 pub mod device;
 pub mod engine;
 pub mod field;
-pub mod frame;
-pub mod hash;
 pub mod kernel;
 pub mod kernels;
 pub mod keyframe;
-pub mod mesh;
-pub mod metrics;
-pub mod pose;
 pub mod recording;
-mod safetensors;
-pub mod sequence;
 pub mod slam;
-pub mod synth;
 pub mod track;
-pub mod trajectory_file;
 
+pub use mte_slam_mesh as mesh;
 pub use mte_slam_shaders as shaders;
 pub use mte_slam_shaders::{layout, shader};
+pub use mte_slam_types::{camera, classes, frame, hash, pose, sequence};

@@ -28,6 +28,11 @@ impl<T> Buffer<T> {
         self.id
     }
 
+    /// The same buffer, float by float.
+    pub const fn floats(self) -> Buffer<f32> {
+        self.cast()
+    }
+
     /// The same buffer for a kernel that takes its words for other elements.
     pub const fn cast<U>(self) -> Buffer<U> {
         Buffer::new(self.id)

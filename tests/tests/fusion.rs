@@ -5,7 +5,6 @@ use mte_slam_core::{
     config::{Config, FusionConfig, LossConfig},
     device::{Batch, ClassWeight, Device, Guidance, Rates},
     engine::Engine,
-    frame::{FeatureMap, Frame},
     kernels::{
         shared::{FLAG_ANCHORS, FLAG_DENSE, FLAG_GUIDED, FLAG_MAP},
         tokens::{APPEARANCE_AT, COLOR_AT, NO_BIAS, SEMANTIC_AT},
@@ -19,6 +18,7 @@ use mte_slam_tests::{
     fixture::{self, CLASSES, DEPTH_UNIT_M, FRAMES, Options, State},
     gpu_engine,
 };
+use mte_slam_types::frame::{FeatureMap, Frame};
 use pollster::block_on;
 use std::{collections::BTreeSet, ops::Range};
 
@@ -567,7 +567,7 @@ fn a_patch_moves_its_own_token() {
 /// An image smaller than a token fuses nothing, and nothing fails.
 #[test]
 fn an_image_smaller_than_a_token() {
-    let camera = mte_slam_core::camera::Camera { width: 30, height: 7, ..fixture::camera() };
+    let camera = mte_slam_types::camera::Camera { width: 30, height: 7, ..fixture::camera() };
     let c = config(FusionConfig::default());
     let mut d =
         Device::new(Engine::cpu(), &c, camera, DEPTH_UNIT_M, CLASSES, fixture::shape()).unwrap();

@@ -7,18 +7,15 @@
 //! derivatives along whole directions, where a kink is one term of many, may not.
 use glam::DVec3;
 use mte_slam_core::{
-    camera::Camera,
     config::{Config, Head, LossConfig},
     device::{Batch, Device, Guidance, Rates, Trained},
     engine::Engine,
-    frame::{Bounds, Frame},
     kernels::{
         align_points::ALIGN_POINTS,
         sample_rays::SAMPLE_RAYS,
         shared::{FLAG_GUIDED, FLAG_MAP, FLAG_POSE},
     },
     layout::{HEAD_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_POSE},
-    pose::Pose,
     recording::Recording,
     shaders::decoders::{COLOR, GEOMETRY, SEMANTIC},
 };
@@ -27,6 +24,11 @@ use mte_slam_tests::{
     cases::pixels,
     f32_words,
     fixture::{self, CLASSES, DEPTH_UNIT_M, FRAMES, Options, State, run_words, words},
+};
+use mte_slam_types::{
+    camera::Camera,
+    frame::{Bounds, Frame},
+    pose::Pose,
 };
 use pollster::block_on;
 use std::ops::Range;

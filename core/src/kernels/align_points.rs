@@ -15,7 +15,14 @@ kernel! { pub static ALIGN_POINTS = mte_slam_shaders::kernels::align_points, twi
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let Views { poses, pixels, planes_geometry: geometry, planes_appearance: appearance, decoders, partials } = dispatch.views();
+    let Views {
+        poses,
+        pixels,
+        planes_geometry: geometry,
+        planes_appearance: appearance,
+        decoders,
+        partials,
+    } = dispatch.views();
     let (grid, surface_grid) = (Grid::geometry(&p), Grid::surface(&p));
     let surface = surface_weights(decoders);
     dispatch.for_each_workgroup(|group| {

@@ -1,5 +1,8 @@
 //! Gradients of the attention at its keys and values.
-use super::{attend_tokens::{Pairs, columns}, tokens::{TILE, TokenParams, sixteen}};
+use super::{
+    attend_tokens::{Pairs, columns},
+    tokens::{TILE, TokenParams, sixteen},
+};
 use crate::kernel::{CpuDispatch, load_f32, store_f32};
 
 kernel! { pub static ATTEND_KEYS = mte_slam_shaders::kernels::attend_keys, twin }

@@ -1,5 +1,8 @@
 //! Gradients of the attention at its queries.
-use super::{attend_tokens::{Pairs, attended, columns}, tokens::{NO_RESIDUAL, TILE, TokenParams, dot, sixteen}};
+use super::{
+    attend_tokens::{Pairs, attended, columns},
+    tokens::{NO_RESIDUAL, TILE, TokenParams, dot, sixteen},
+};
 use crate::kernel::{CpuDispatch, load_f32, store_f32};
 
 kernel! { pub static ATTEND_QUERIES = mte_slam_shaders::kernels::attend_queries, twin }

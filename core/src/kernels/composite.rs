@@ -7,7 +7,15 @@ kernel! { pub static COMPOSITE = mte_slam_shaders::kernels::composite, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let Views { rays, depths, distances, planes_appearance: appearance_planes, planes_semantic: semantic_planes, weights, ray_state } = dispatch.views();
+    let Views {
+        rays,
+        depths,
+        distances,
+        planes_appearance: appearance_planes,
+        planes_semantic: semantic_planes,
+        weights,
+        ray_state,
+    } = dispatch.views();
     let grid = Grid::surface(&p);
     let n = p.samples as usize;
     dispatch.for_each_invocation(|id| {

@@ -10,7 +10,16 @@ kernel! { pub static COMPOSITE_BACKWARD = mte_slam_shaders::kernels::composite_b
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let Views { rays, depths, distances, weights, planes_appearance: planes, ray_state, ray_out, distance_gradient: gradient } = dispatch.views();
+    let Views {
+        rays,
+        depths,
+        distances,
+        weights,
+        planes_appearance: planes,
+        ray_state,
+        ray_out,
+        distance_gradient: gradient,
+    } = dispatch.views();
     let grid = Grid::surface(&p);
     let n = p.samples as usize;
     let inv_rays = 1.0 / p.rays as f32;

@@ -99,7 +99,16 @@ fn fused_target<'a>(p: &FieldParams, targets: &'a [f32], ray: &Ray) -> Option<&'
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let Views { rays, decoders, ray_state, ray_out, logits_gradient: logits, anchors, targets, class_weights } = dispatch.views();
+    let Views {
+        rays,
+        decoders,
+        ray_state,
+        ray_out,
+        logits_gradient: logits,
+        anchors,
+        targets,
+        class_weights,
+    } = dispatch.views();
     let surface = surface_weights(decoders);
     let inv_rays = 1.0 / p.rays as f32;
     dispatch.for_each_invocation(|id| {

@@ -1,5 +1,8 @@
 //! Raw features of each patch of an image: geometry, colours, class histogram.
-use super::{shared::{Vec3, cross, sin_cos}, tokens::{BANDS, RAW_GEOMETRY, RAW_HISTOGRAM, RAW_MEAN, RAW_PATCH, RAW_POINT, TokenParams}};
+use super::{
+    shared::{Vec3, cross, sin_cos},
+    tokens::{BANDS, RAW_GEOMETRY, RAW_HISTOGRAM, RAW_MEAN, RAW_PATCH, RAW_POINT, TokenParams},
+};
 use crate::kernel::{CpuDispatch, load_f32, store_f32};
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;

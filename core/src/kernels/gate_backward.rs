@@ -1,5 +1,9 @@
 //! Gradients through the gating.
-use super::{attend_tokens::columns, gate_tokens::sigmoid, tokens::{FUSED_AT, GATE_AT, GEOMETRY_AT, TokenParams, dot, sixteen}};
+use super::{
+    attend_tokens::columns,
+    gate_tokens::sigmoid,
+    tokens::{FUSED_AT, GATE_AT, GEOMETRY_AT, TokenParams, dot, sixteen},
+};
 use crate::kernel::{CpuDispatch, load_f32, store_f32};
 
 kernel! { pub static GATE_BACKWARD = mte_slam_shaders::kernels::gate_backward, twin }

@@ -9,7 +9,15 @@ kernel! { pub static GEOMETRY_BACKWARD = mte_slam_shaders::kernels::geometry_bac
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let Views { rays, depths, planes_geometry: planes, decoders, distance_gradient: gradient, features, position_gradient: positions } = dispatch.views();
+    let Views {
+        rays,
+        depths,
+        planes_geometry: planes,
+        decoders,
+        distance_gradient: gradient,
+        features,
+        position_gradient: positions,
+    } = dispatch.views();
     let grid = Grid::geometry(&p);
     let count = (p.rays * p.samples) as usize;
     let one = |sample: usize| {

@@ -7,7 +7,8 @@ kernel! { pub static GEOMETRY_FORWARD = mte_slam_shaders::kernels::geometry_forw
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let Views { rays, depths, planes_geometry: planes, decoders, features, distances } = dispatch.views();
+    let Views { rays, depths, planes_geometry: planes, decoders, features, distances } =
+        dispatch.views();
     let grid = Grid::geometry(&p);
     let keep = p.flags & (FLAG_MAP | FLAG_POSE) != 0;
     dispatch.for_each_invocation(|sample| {

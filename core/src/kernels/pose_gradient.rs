@@ -1,5 +1,5 @@
 //! Sums the gradients at a ray's sample positions into its pose gradient.
-use super::shared::{cross};
+use super::shared::cross;
 use crate::kernel::{CpuDispatch, load_f32, store_f32};
 use crate::layout::{FieldParams, RAY_STATE_FLOATS, STATE_POSE};
 

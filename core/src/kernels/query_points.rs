@@ -11,7 +11,15 @@ kernel! { pub static QUERY_POINTS = mte_slam_shaders::kernels::query_points, twi
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let Views { points, planes_geometry: geometry, planes_appearance: appearance, planes_semantic: semantic, decoders, anchors, values } = dispatch.views();
+    let Views {
+        points,
+        planes_geometry: geometry,
+        planes_appearance: appearance,
+        planes_semantic: semantic,
+        decoders,
+        anchors,
+        values,
+    } = dispatch.views();
     let (grid, surface_grid) = (Grid::geometry(&p), Grid::surface(&p));
     let surface = surface_weights(decoders);
     dispatch.for_each_invocation(|i| {

@@ -1,5 +1,8 @@
 //! What the map already holds at the tokens' points.
-use super::{shared::{Grid, semantic_hidden, semantic_output, surface_weights}, tokens::{RAW_MEMORY, RAW_POINT}};
+use super::{
+    shared::{Grid, semantic_hidden, semantic_output, surface_weights},
+    tokens::{RAW_MEMORY, RAW_POINT},
+};
 use crate::kernel::{CpuDispatch, load_f32, store_f32};
 use crate::layout::FieldParams;
 

@@ -7,7 +7,15 @@ kernel! { pub static SAMPLE_FEATURES = mte_slam_shaders::kernels::sample_feature
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let Views { rays, depths, weights, planes_semantic: planes, features, slot_depths, slot_weights } = dispatch.views();
+    let Views {
+        rays,
+        depths,
+        weights,
+        planes_semantic: planes,
+        features,
+        slot_depths,
+        slot_weights,
+    } = dispatch.views();
     let grid = Grid::surface(&p);
     let (n, slots) = (p.samples as usize, p.slots as usize);
     dispatch.for_each_invocation(|job| {

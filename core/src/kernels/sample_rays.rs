@@ -8,7 +8,8 @@ kernel! { pub static SAMPLE_RAYS = mte_slam_shaders::kernels::sample_rays, twin 
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let Views { poses, window, color_images, depth_images, class_rarity, rays: out } = dispatch.views();
+    let Views { poses, window, color_images, depth_images, class_rarity, rays: out } =
+        dispatch.views();
     let pixels = p.width * p.height;
     let depth_stride = pixels.div_ceil(2);
     let raw_depth = |slot: u32, pixel: u32| {
@@ -42,7 +43,8 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                 let mut best = rarity(slot, pixel);
                 for k in 1..p.rare_draws {
                     let at = index.wrapping_mul(256).wrapping_add(k);
-                    let candidate = random_u32(p.seed, p.iteration, at, salt::RARE_CANDIDATE) % pixels;
+                    let candidate =
+                        random_u32(p.seed, p.iteration, at, salt::RARE_CANDIDATE) % pixels;
                     let rare = rarity(slot, candidate);
                     if rare > best {
                         (best, pixel) = (rare, candidate);

@@ -33,7 +33,8 @@ pub(super) fn add_quanta(
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let Views { rays: ray_words, depths, distance_gradient: ds, features, gradient, status } = dispatch.views();
+    let Views { rays: ray_words, depths, distance_gradient: ds, features, gradient, status } =
+        dispatch.views();
     let grid = Grid::geometry(&p);
     let n = p.samples as usize;
     dispatch.for_each_invocation(|job| {

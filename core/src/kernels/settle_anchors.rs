@@ -1,7 +1,7 @@
 //! Anchors settle where the nearest one tells the head's class.
 pub use mte_slam_shaders::kernels::settle_anchors::SettleAnchorsParams;
 
-use super::shared::{likeliest_class};
+use super::shared::likeliest_class;
 use crate::kernel::{CpuDispatch, load_f32, load_u32, store_f32, store_u32};
 use crate::layout::{
     ANCHOR_FLOATS, FEATURE, NO_ANCHOR, RAY_STATE_FLOATS, STATE_ANCHOR, STATE_FEATURE,

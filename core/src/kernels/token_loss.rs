@@ -1,7 +1,11 @@
 //! What trains the fusion: classes and colour read from F. F is also the rays' target.
-use super::{gate_tokens::sigmoid, shared::{class_logit, head_row}, tokens::{
+use super::{
+    gate_tokens::sigmoid,
+    shared::{class_logit, head_row},
+    tokens::{
         COLOR_AT, FUSED_AT, LOGITS_AT, RAW_HISTOGRAM, RAW_MEAN, RAW_POINT, TokenParams, sixteen,
-    }};
+    },
+};
 use crate::kernel::{CpuDispatch, load_f32, store_f32};
 use crate::layout::TARGET_FLOATS;
 
@@ -9,7 +13,15 @@ kernel! { pub static TOKEN_LOSS = mte_slam_shaders::kernels::token_loss, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: TokenParams = dispatch.params();
-    let Views { parameters: w, decoders, class_weights, raw, tokens, token_gradient: gradient, targets } = dispatch.views();
+    let Views {
+        parameters: w,
+        decoders,
+        class_weights,
+        raw,
+        tokens,
+        token_gradient: gradient,
+        targets,
+    } = dispatch.views();
     let inv = 1.0 / p.tokens() as f32;
     dispatch.for_each_invocation(|token| {
         if token >= p.tokens() {

@@ -15,15 +15,17 @@ use crate::{
 use anyhow::{Context, Result};
 use glam::DVec3;
 use mte_slam_core::{
-    camera::Camera,
     config::{Config, Head},
     device::{Batch, Device, Guidance, Rates},
     engine::Engine,
     field::FieldShape,
-    frame::{Bounds, Frame},
     kernels::shared::{FLAG_GUIDED, FLAG_MAP, FLAG_MASK, FLAG_POSE},
-    pose::Pose,
     recording::{Command, Recording},
+};
+use mte_slam_types::{
+    camera::Camera,
+    frame::{Bounds, Frame},
+    pose::Pose,
 };
 use pollster::block_on;
 use serde::Serialize;
