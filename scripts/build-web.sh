@@ -33,7 +33,10 @@ target=$(
         CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS="-C target-feature=+simd128 -C llvm-args=-inline-threshold=25" \
         CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}/web"
     # What runs once a frame at most is made small; the kernels' twins are not.
-    set -- --config profile.release.package.mte-slam-core.opt-level=2
+    set --
+    for crate in core types odometry dataset mesh metrics synth; do
+        set -- "$@" --config "profile.release.package.mte-slam-$crate.opt-level=2"
+    done
     for crate in mte-slam-web serde_json zip zune-jpeg image png fdeflate miniz_oxide wgpu js-sys serde-wasm-bindgen; do
         set -- "$@" --config "profile.release.package.$crate.opt-level='s'"
     done

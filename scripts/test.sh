@@ -52,7 +52,7 @@ if [ $cross -eq 0 ]; then
     step "no_std build of the core for thumbv7em-none-eabi"
     (
         eval "$setup"
-        cargo build --locked -p mte-slam-core --no-default-features --target thumbv7em-none-eabi
+        cargo build --locked -p mte-slam-core -p mte-slam-metrics -p mte-slam-synth --no-default-features --target thumbv7em-none-eabi
     )
     step "wasm32 build of the browser bindings"
     (

@@ -6,27 +6,17 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 extern crate alloc;
 
-pub mod camera;
-pub mod classes;
 pub mod config;
-#[cfg(feature = "dataset")]
-pub mod dataset;
 pub mod engine;
 pub mod field;
-pub mod frame;
-pub mod hash;
 pub mod kernels;
 pub mod keyframe;
 pub mod layout;
 pub mod map;
-pub mod mesh;
-pub mod metrics;
-pub mod pose;
 pub mod recording;
-mod safetensors;
-pub mod sequence;
 pub mod shader;
 pub mod slam;
-pub mod synth;
 pub mod track;
-pub mod trajectory_file;
+
+pub use mte_slam_mesh as mesh;
+pub use mte_slam_types::{camera, classes, frame, hash, pose, sequence};

@@ -1,16 +1,13 @@
 //! Writes a few small valid inputs of every target: `cargo run --example seeds -- CORPUS`.
-use mte_slam_core::{
-    config::Config,
-    dataset::{Layout, MemorySource},
-    mesh::{Mesh, write_ply},
-    pose::Pose,
-    trajectory_file::write_tum,
-};
+use mte_slam_core::config::Config;
+use mte_slam_dataset::{Layout, MemorySource};
+use mte_slam_mesh::{Mesh, write_ply};
+use mte_slam_types::{pose::Pose, trajectory_file::write_tum};
 use mte_slam_fuzz::{bundle::Bundle, state::Run};
 use recordings::{archive, recording};
 use std::{fs, io, path::PathBuf};
 
-#[path = "../../core/tests/recordings/mod.rs"]
+#[path = "../../crates/dataset/tests/recordings/mod.rs"]
 mod recordings;
 
 /// Only what belongs to the first two frames, so that inputs stay small.

@@ -1,10 +1,8 @@
 //! Zip archives, and the recordings in them.
 #![no_main]
 use libfuzzer_sys::fuzz_target;
-use mte_slam_core::{
-    dataset::{Layout, ZipSource},
-    sequence::Source,
-};
+use mte_slam_dataset::{Layout, ZipSource};
+use mte_slam_types::sequence::Source;
 use mte_slam_fuzz::{bundle::Bundle, limit_memory, recordings};
 use std::io::Cursor;
 

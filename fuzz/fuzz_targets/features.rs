@@ -1,7 +1,7 @@
 //! Feature maps: the first byte says in which format.
 #![no_main]
 use libfuzzer_sys::fuzz_target;
-use mte_slam_core::dataset::fuzzing::parse_features;
+use mte_slam_dataset::fuzzing::parse_features;
 use mte_slam_fuzz::limit_memory;
 
 const FILES: [&str; 2] = ["000000.npy", "000000.safetensors"];

@@ -1,7 +1,7 @@
 //! PNG and JPEG images as colour, depth and labels.
 #![no_main]
 use libfuzzer_sys::fuzz_target;
-use mte_slam_core::dataset::{MAX_PIXELS, fuzzing::decode_image};
+use mte_slam_dataset::{MAX_PIXELS, fuzzing::decode_image};
 use mte_slam_fuzz::limit_memory;
 
 fuzz_target!(init: limit_memory(), |data: &[u8]| {

@@ -1,7 +1,7 @@
 //! PLY meshes: what is read can be written and is the same when read again.
 #![no_main]
 use libfuzzer_sys::fuzz_target;
-use mte_slam_core::mesh::{read_ply, write_ply};
+use mte_slam_mesh::{read_ply, write_ply};
 use mte_slam_fuzz::limit_memory;
 
 fuzz_target!(init: limit_memory(), |data: &[u8]| {

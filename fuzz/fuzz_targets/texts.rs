@@ -1,7 +1,7 @@
 //! Small text files: class lists, TUM trajectories, configurations. The first byte says which.
 #![no_main]
 use libfuzzer_sys::fuzz_target;
-use mte_slam_core::dataset::ClassList;
+use mte_slam_dataset::ClassList;
 use mte_slam_fuzz::limit_memory;
 
 // The program's own readers; they are in a binary, which cannot be linked.

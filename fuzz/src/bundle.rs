@@ -1,6 +1,6 @@
 //! Several named files in one input: four bytes of options, then for each file the length of its
 //! name (u8), the name, its length (u32, little endian) and its bytes. Every input can be read so.
-use mte_slam_core::dataset::MemorySource;
+use mte_slam_dataset::MemorySource;
 
 /// A file.
 #[derive(Clone, Debug, Default, PartialEq)]

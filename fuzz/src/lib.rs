@@ -40,7 +40,7 @@ macro_rules! fuzz_recordings {
     ($($layout:ident),+) => {
         libfuzzer_sys::fuzz_target!(init: $crate::limit_memory(), |data: &[u8]| {
             let bundle = $crate::bundle::Bundle::parse(data);
-            let layouts = [$(mte_slam_core::dataset::Layout::$layout),+];
+            let layouts = [$(mte_slam_dataset::Layout::$layout),+];
             $crate::recordings::read(Box::new(bundle.source()), &bundle, &layouts);
         });
         $crate::mutate_bundles!();

@@ -1,13 +1,7 @@
 //! What is done with a recording of any layout.
 use crate::bundle::Bundle;
-use mte_slam_core::{
-    dataset::{
-        Axes, ClassList, GivenCamera, LabelSource, Layout, OpenOptions,
-        inspect::{InspectOptions, inspect},
-        open,
-    },
-    sequence::Source,
-};
+use mte_slam_dataset::{Axes, ClassList, GivenCamera, LabelSource, Layout, OpenOptions, inspect::{InspectOptions, inspect}, open};
+use mte_slam_types::sequence::Source;
 
 /// Most frames that are decoded of one input.
 const FRAMES: usize = 3;

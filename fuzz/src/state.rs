@@ -1,13 +1,8 @@
 //! A tiny run, and checkpoints of it that are not what they were.
 use crate::bundle::{Bundle, File};
-use mte_slam_core::{
-    config::{Config, Tracker},
-    engine::Engine,
-    frame::{Frame, SequenceInfo},
-    sequence::Sequence,
-    slam::{Checkpoint, Slam, SlamError},
-    synth::{SyntheticOptions, SyntheticSequence},
-};
+use mte_slam_core::{config::{Config, Tracker}, engine::Engine, slam::{Checkpoint, Slam, SlamError}};
+use mte_slam_types::{frame::{Frame, SequenceInfo}, sequence::Sequence};
+use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
 use pollster::block_on;
 
 const FRAMES: usize = 3;

@@ -13,7 +13,7 @@ pub use suite::EvaluateArgs;
 
 use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
 use glam::{DQuat, DVec3};
-use mte_slam_core::pose::Pose;
+use mte_slam_types::pose::Pose;
 use std::path::PathBuf;
 
 /// Neural RGB-D semantic SLAM on any GPU, or none.

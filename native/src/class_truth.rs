@@ -1,7 +1,7 @@
 //! The labels that classes are scored against, which need not be those that the map learnt from:
 //! an imperfect segmenter's labels go in, and the question is whether the map is better than they.
 use anyhow::{Result, bail};
-use mte_slam_core::{
+use mte_slam_types::{
     classes::{Class, ClassTable, UNLABELLED},
     frame::{Frame, SequenceInfo},
     sequence::Sequence,
@@ -152,7 +152,7 @@ fn mapped(classes: &[u8], to: &[u8]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mte_slam_core::synth::{SyntheticOptions, SyntheticSequence};
+    use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
 
     fn class(raw_id: u16, name: &str) -> Class {
         Class { raw_id, name: name.to_owned(), color: [0; 3] }

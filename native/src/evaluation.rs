@@ -4,16 +4,16 @@ use crate::{
     output::metrics::{Metrics, RenderRecord, SemanticFigures},
 };
 use anyhow::{Context, Result};
-use mte_slam_core::{
+use mte_slam_core::slam::{PoseEstimate, View};
+use mte_slam_metrics::{
+    AteReport, ConfusionMatrix, DepthMeter, PosePair, PsnrMeter, SemanticMeter, TrajectoryError,
+    align_rigid, ate,
+};
+use mte_slam_odometry::ColourRegistration;
+use mte_slam_types::{
     classes::ClassTable,
     frame::{Frame, SequenceInfo},
-    metrics::{
-        AteReport, ConfusionMatrix, DepthMeter, PosePair, PsnrMeter, SemanticMeter,
-        TrajectoryError, align_rigid, ate,
-    },
     pose::Pose,
-    slam::{PoseEstimate, View},
-    track::odometry::ColourRegistration,
 };
 use std::borrow::Cow;
 

@@ -10,13 +10,13 @@ use crate::{
     source::{self, has_ending},
 };
 use anyhow::{Result, anyhow};
-use mte_slam_core::{
+use mte_slam_dataset::{Axes, ClassList, LabelSource, Layout, OpenOptions};
+use mte_slam_mesh::Mesh;
+use mte_slam_synth::{SyntheticMesh, SyntheticOptions, SyntheticSequence};
+use mte_slam_types::{
     classes::UNLABELLED,
-    dataset::{self, Axes, ClassList, LabelSource, Layout, OpenOptions},
     frame::SequenceInfo,
-    mesh::Mesh,
     sequence::{Sequence, Source},
-    synth::{SyntheticMesh, SyntheticOptions, SyntheticSequence},
 };
 use std::path::{Path, PathBuf};
 
@@ -154,7 +154,7 @@ fn open_source(
         unlabelled_raw_id: selection.classes.unlabelled,
         ..OpenOptions::default()
     };
-    dataset::open(source, options).map_err(|e| {
+    mte_slam_dataset::open(source, options).map_err(|e| {
         let (message, name) = (e.to_string(), path.display().to_string());
         // Errors about one file name it below the folder only.
         if message.contains(&name) { anyhow!(message) } else { anyhow!("{name}: {message}") }

@@ -1,16 +1,12 @@
 //! A mesh against the true one, by the protocols of the field.
 use crate::{output::metrics::Metrics, screen::Screen};
 use anyhow::{Context, Result, bail};
-use mte_slam_core::{
-    camera::Camera,
-    mesh::{self, CullProtocol, DepthRenderer, Keep, Mesh, Visibility},
-    metrics::{
-        self, DepthViews, MeshDepthReport, SurfaceOptions, SurfaceReport, VIRTUAL_CAMERA,
-        culling_views, depth_l1, depth_views, evaluate_surface,
-    },
-    pose::Pose,
-    sequence::Sequence,
+use mte_slam_mesh::{CullProtocol, DepthRenderer, Keep, Mesh, Visibility};
+use mte_slam_metrics::{
+    DepthViews, MeshDepthReport, SurfaceOptions, SurfaceReport, VIRTUAL_CAMERA, culling_views,
+    depth_l1, depth_views, evaluate_surface,
 };
+use mte_slam_types::{camera::Camera, pose::Pose, sequence::Sequence};
 use serde::Serialize;
 use std::path::Path;
 
@@ -35,8 +31,8 @@ impl MeshTruth {
         let name = path.display();
         let bytes =
             std::fs::read(path).with_context(|| format!("{name}: the true mesh cannot be read"))?;
-        let mesh =
-            mesh::read_ply(&bytes).with_context(|| format!("{name}: not a mesh in PLY format"))?;
+        let mesh = mte_slam_mesh::read_ply(&bytes)
+            .with_context(|| format!("{name}: not a mesh in PLY format"))?;
         if mesh.triangles.is_empty() {
             bail!("{name}: the true mesh: found no faces, expected a triangle mesh");
         }
@@ -150,7 +146,7 @@ fn compare(
     }
     let culled = |m: &Mesh, seen: &Visibility| {
         let mut part = m.clone();
-        mesh::cull(&mut part, seen, Keep::AnySeen);
+        mte_slam_mesh::cull(&mut part, seen, Keep::AnySeen);
         part
     };
     let n = poses.len();
@@ -164,7 +160,7 @@ fn compare(
     if protocols.frustum {
         let protocol = CullProtocol::Frustum;
         let seen = |m: &Mesh| {
-            let in_view = mesh::in_any_frustum(&m.positions, &camera, &poses);
+            let in_view = mte_slam_mesh::in_any_frustum(&m.positions, &camera, &poses);
             Visibility { unhidden: in_view.clone(), in_view }
         };
         let mut pair = [culled(&ours, &seen(&ours)), culled(&truth, &seen(&truth))];
@@ -198,7 +194,7 @@ fn compare(
         seen
     };
     let seen_of_ours = seen(&ours);
-    mesh::cull(&mut ours, &seen_of_ours, Keep::AnySeen);
+    mte_slam_mesh::cull(&mut ours, &seen_of_ours, Keep::AnySeen);
     drop(seen_of_ours);
     let mut pair = [ours, culled(&truth, &seen(&truth))];
     let how = format!("{} in {n} real and {} virtual views", protocol.name(), virtual_poses.len());
@@ -240,7 +236,7 @@ fn sensor_visibility(
     for index in 0..info.frames {
         let Some(world_from_camera) = sequence.truth(index) else { continue };
         let frame = sequence.frame(index)?;
-        let view = mesh::View {
+        let view = mte_slam_mesh::View {
             camera: &info.camera,
             world_from_camera,
             depth: &frame.depth,
@@ -255,7 +251,7 @@ fn sensor_visibility(
 
 /// Align the first mesh of a pair to the second.
 fn align([ours, truth]: &mut [Mesh; 2], seed: u32) -> Result<()> {
-    let aligned = metrics::icp(ours, truth, ICP_M, seed)?;
+    let aligned = mte_slam_metrics::icp(ours, truth, ICP_M, seed)?;
     ours.transform(&aligned);
     Ok(())
 }

@@ -11,14 +11,13 @@ use crate::{
     screen::Screen,
 };
 use anyhow::{Context, Result};
-use mte_slam_core::{
-    config::Inference,
-    dataset::{ColorFormat, RecordingWriter, ReplicaWriter},
+use mte_slam_core::{config::Inference, slam::Slam};
+use mte_slam_dataset::{ColorFormat, RecordingWriter, ReplicaWriter};
+use mte_slam_metrics::ConfusionMatrix;
+use mte_slam_types::{
     frame::{Frame, SequenceInfo},
-    metrics::ConfusionMatrix,
     pose::Pose,
     sequence::Sequence,
-    slam::Slam,
 };
 use pollster::block_on;
 use std::{io, path::Path};

@@ -25,13 +25,13 @@ use crate::{
 };
 use anyhow::{Context, Result};
 use glam::DVec3;
-use mte_slam_core::{
+use mte_slam_core::slam::{FrameReport, PoseEstimate, Slam, TrackingStatus, View};
+use mte_slam_mesh::Mesh;
+use mte_slam_types::{
     classes::ClassTable,
     frame::{Frame, SequenceInfo},
-    mesh::Mesh,
     pose::Pose,
     sequence::Sequence,
-    slam::{FrameReport, PoseEstimate, Slam, TrackingStatus, View},
 };
 use pollster::block_on;
 use serde::{Deserialize, Serialize};

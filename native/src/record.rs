@@ -5,7 +5,8 @@ use crate::{
     output::metrics::EngineRecord,
 };
 use anyhow::{Context, Result};
-use mte_slam_core::{config::Config, dataset::GivenCamera};
+use mte_slam_core::config::Config;
+use mte_slam_dataset::GivenCamera;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

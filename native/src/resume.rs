@@ -17,10 +17,9 @@ use clap::Parser;
 use mte_slam_core::{
     config::Config,
     engine::{Engine, EngineError},
-    hash::Hasher,
-    sequence::Sequence,
     slam::{Checkpoint, Slam, SlamError},
 };
+use mte_slam_types::{hash::Hasher, sequence::Sequence};
 use pollster::block_on;
 use serde::{Deserialize, Serialize};
 use std::{

@@ -1,8 +1,6 @@
 //! Folders, archives and packed recordings on disk as sources of named bytes.
-use mte_slam_core::{
-    dataset::ZipSource,
-    sequence::{SequenceError, Source, too_short},
-};
+use mte_slam_dataset::ZipSource;
+use mte_slam_types::sequence::{SequenceError, Source, too_short};
 use std::{
     collections::BTreeSet,
     fs,

@@ -1,13 +1,10 @@
 //! Built-in sequences as files.
 use crate::{input, novel, output::new_folder::NewFolder};
 use anyhow::{Context, Result};
-use mte_slam_core::{
-    dataset::{ColorFormat, RecordingWriter, ReplicaWriter},
-    frame::SequenceInfo,
-    mesh::write_ply,
-    sequence::Sequence,
-    synth::{SyntheticOptions, SyntheticSequence},
-};
+use mte_slam_dataset::{ColorFormat, RecordingWriter, ReplicaWriter};
+use mte_slam_mesh::write_ply;
+use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
+use mte_slam_types::{frame::SequenceInfo, sequence::Sequence};
 use std::path::Path;
 
 /// Write a built-in sequence, so many views from other poses, and the true mesh to a folder, in

@@ -1,11 +1,11 @@
 //! Recordings in every layout, written by a Python script that knows nothing of our code, read
 //! back to the same frames; and the commands about recordings on them.
-use mte_slam_core::{
+use mte_slam_dataset::{ClassList, MemorySource, OpenOptions};
+use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
+use mte_slam_types::{
     classes::UNLABELLED,
-    dataset::{self, ClassList, MemorySource, OpenOptions},
     frame::{Frame, SequenceInfo},
     sequence::Sequence,
-    synth::{SyntheticOptions, SyntheticSequence},
 };
 use serde_json::{Value, json};
 use std::{
@@ -208,7 +208,7 @@ fn every_layout_is_read_back_to_the_same_frames() {
     ];
     for (name, layout, kept) in cases {
         let m = source(&f.path(name));
-        let mut sequence = dataset::open(Box::new(m), OpenOptions::default()).unwrap();
+        let mut sequence = mte_slam_dataset::open(Box::new(m), OpenOptions::default()).unwrap();
         assert_eq!(sequence.info().layout, layout, "{name}");
         compare(name, sequence.as_mut(), &kept);
         let notes = sequence.warnings().join("; ");
@@ -229,7 +229,8 @@ fn feature_maps_of_every_kind_are_read() {
     {
         let features = source(&f.path(&format!("features/{kind}")));
         let options = OpenOptions { features: Some(Box::new(features)), ..Default::default() };
-        let mut sequence = dataset::open(Box::new(source(&f.path("images"))), options).unwrap();
+        let mut sequence =
+            mte_slam_dataset::open(Box::new(source(&f.path("images"))), options).unwrap();
         assert_eq!(sequence.info().feature_channels, 3, "{kind}");
         for (i, frame) in f.frames.iter().enumerate() {
             let map = sequence.frame(i).unwrap().features.unwrap();
@@ -250,14 +251,14 @@ fn feature_maps_of_every_kind_are_read() {
 fn occi_is_refused_by_name_and_raw_ids_need_no_table() {
     let Some(f) = fixtures() else { return };
     let m = source(&f.path("sens-raw-occi"));
-    let e = dataset::open(Box::new(m), OpenOptions::default()).err().unwrap().to_string();
+    let e = mte_slam_dataset::open(Box::new(m), OpenOptions::default()).err().unwrap().to_string();
     for part in ["scene0000_00.sens", "compression of depth", "occi", "zlib"] {
         assert!(e.contains(part), "{e}");
     }
     let mut m = source(&f.path("sens-png-raw"));
     m.remove("scannetv2-labels.combined.tsv");
     let options = OpenOptions { only_present_classes: true, ..Default::default() };
-    let sequence = dataset::open(Box::new(m), options).unwrap();
+    let sequence = mte_slam_dataset::open(Box::new(m), options).unwrap();
     let classes = &sequence.info().classes.classes;
     assert!(classes.len() > 5 && classes.iter().all(|c| c.raw_id % 97 == 3), "{classes:?}");
 }
@@ -375,7 +376,7 @@ fn converted_recordings_hold_the_same_frames() {
             let done = mte_slam(&["convert", target, "--to", to, "--quiet"], &f.path(name));
             assert!(done.status.success(), "{name} {to}: {}", text(&done.stderr));
             let mut sequence =
-                dataset::open(Box::new(source(&out)), OpenOptions::default()).unwrap();
+                mte_slam_dataset::open(Box::new(source(&out)), OpenOptions::default()).unwrap();
             assert_eq!(sequence.info().layout, to);
             let kept = Kept {
                 // Millimetres are whole numbers of 1/5000 m.
@@ -406,7 +407,8 @@ fn check_tum(name: &str, from: &Path, converted: &mut dyn Sequence) {
     if from.is_file() {
         return; // archives are read by the program alone
     }
-    let mut original = dataset::open(Box::new(source(from)), OpenOptions::default()).unwrap();
+    let mut original =
+        mte_slam_dataset::open(Box::new(source(from)), OpenOptions::default()).unwrap();
     assert!((converted.info().depth_unit_m * 5000.0 - 1.0).abs() < 1e-12);
     for i in 0..FRAMES {
         let (a, b) = (original.frame(i).unwrap(), converted.frame(i).unwrap());

@@ -1,6 +1,6 @@
 //! The evaluation protocols as people run them: `eval` on the files of a run, with true meshes whose
 //! figures are known.
-use mte_slam_core::mesh::{read_ply, write_ply};
+use mte_slam_mesh::{read_ply, write_ply};
 use serde_json::Value;
 use std::{
     fs,

@@ -9,11 +9,10 @@ use crate::{
 use mte_slam_core::{
     config::{Config, Tracker},
     engine::{Engine, EngineError},
-    pose::Pose,
-    sequence::Sequence,
     slam::{Slam, SlamError},
-    synth::{SyntheticOptions, SyntheticSequence},
 };
+use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
+use mte_slam_types::{pose::Pose, sequence::Sequence};
 
 /// All buffers after a case.
 ///

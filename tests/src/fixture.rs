@@ -4,19 +4,21 @@ use crate::{TestRandom, f32_words};
 use bytemuck::Zeroable;
 use glam::DVec3;
 use mte_slam_core::{
-    camera::Camera,
     config::FieldConfig,
     engine::{Engine, EngineError},
     field::{FieldShape, initial_decoders},
-    frame::{Bounds, Frame},
     kernels::{
         self, Kernel,
         shared::{FLAG_GUIDED, FLAG_MAP, FLAG_MASK, FLAG_POSE, RAY_WORDS},
     },
     layout::{BACKWARD_STRIP, FieldParams, RAY_OUT_FLOATS, RAY_STATE_FLOATS},
     map::pose_words,
-    pose::Pose,
     recording::{Command, Recording, workgroups_1d},
+};
+use mte_slam_types::{
+    camera::Camera,
+    frame::{Bounds, Frame},
+    pose::Pose,
 };
 use pollster::block_on;
 use std::collections::BTreeMap;

@@ -7,9 +7,9 @@ use crate::{
 use mte_slam_core::{
     engine::{Engine, EngineError},
     kernels,
-    pose::Pose,
     slam::SlamError,
 };
+use mte_slam_types::pose::Pose;
 use pollster::block_on;
 
 /// All buffers after a case.

@@ -1,18 +1,15 @@
 //! A map on an engine, without a run around it: what tests of passes and gradients drive.
+use crate::fixture::{CLASSES, DEPTH_UNIT_M};
 use mte_slam_core::{
-    camera::Camera,
     config::Config,
     engine::Engine,
     field::FieldShape,
-    frame::Frame,
     map::{AnchorCounts, Batch, FrameFormat, Map, Rates, Scratch, fusion, passes, suppressor},
-    pose::Pose,
     recording::{BufferId, Recording},
 };
+use mte_slam_types::{camera::Camera, frame::Frame, pose::Pose};
 use pollster::block_on;
 use std::ops::Deref;
-
-use crate::fixture::{CLASSES, DEPTH_UNIT_M};
 
 /// An engine, a map and its scratch buffers. Reads as the map.
 pub struct Rig {

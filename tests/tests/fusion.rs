@@ -4,7 +4,6 @@
 use mte_slam_core::{
     config::{Config, FusionConfig, LossConfig},
     engine::Engine,
-    frame::{FeatureMap, Frame},
     kernels::{
         shared::{FLAG_ANCHORS, FLAG_DENSE, FLAG_GUIDED, FLAG_MAP},
         tokens::{APPEARANCE_AT, COLOR_AT, NO_BIAS, SEMANTIC_AT},
@@ -21,6 +20,7 @@ use mte_slam_tests::{
     gpu_engine,
     rig::Rig,
 };
+use mte_slam_types::frame::{FeatureMap, Frame};
 use std::{collections::BTreeSet, ops::Range};
 
 const RAYS_PER_FRAME: u32 = 60;
@@ -549,7 +549,7 @@ fn a_patch_moves_its_own_token() {
 /// An image smaller than a token fuses nothing, and nothing fails.
 #[test]
 fn an_image_smaller_than_a_token() {
-    let camera = mte_slam_core::camera::Camera { width: 30, height: 7, ..fixture::camera() };
+    let camera = mte_slam_types::camera::Camera { width: 30, height: 7, ..fixture::camera() };
     let c = config(FusionConfig::default());
     let mut d = Rig::new(Engine::cpu(), &c, camera, 0, fixture::shape());
     assert!(d.fusion.is_none() && d.suppressor.is_some());

@@ -7,10 +7,8 @@
 //! derivatives along whole directions, where a kink is one term of many, may not.
 use glam::DVec3;
 use mte_slam_core::{
-    camera::Camera,
     config::{Config, Head, LossConfig},
     engine::Engine,
-    frame::{Bounds, Frame},
     kernels::{
         align_points::ALIGN_POINTS,
         sample_rays::SAMPLE_RAYS,
@@ -18,7 +16,6 @@ use mte_slam_core::{
     },
     layout::{GEOMETRY_FLOATS, HEAD_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS},
     map::{Batch, ParameterTensor, Rates, SemanticSupervision},
-    pose::Pose,
     recording::Recording,
 };
 use mte_slam_tests::{
@@ -27,6 +24,11 @@ use mte_slam_tests::{
     f32_words,
     fixture::{self, CLASSES, DEPTH_UNIT_M, FRAMES, Options, State, run_words, words},
     rig::Rig,
+};
+use mte_slam_types::{
+    camera::Camera,
+    frame::{Bounds, Frame},
+    pose::Pose,
 };
 use std::ops::Range;
 

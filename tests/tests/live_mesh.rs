@@ -2,11 +2,11 @@
 use mte_slam_core::{
     config::Config,
     engine::Engine,
-    mesh::Mesh,
-    sequence::Sequence,
     slam::{LiveMesh, MeshChunk, Slam},
-    synth::{SyntheticOptions, SyntheticSequence},
 };
+use mte_slam_mesh::Mesh;
+use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
+use mte_slam_types::sequence::Sequence;
 use pollster::block_on;
 use std::collections::BTreeMap;
 

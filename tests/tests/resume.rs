@@ -3,12 +3,14 @@
 use mte_slam_core::{
     config::{Config, Tracker},
     engine::{Engine, EngineError},
+    slam::{Checkpoint, Slam, SlamError},
+};
+use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
+use mte_slam_tests::gpu_engine;
+use mte_slam_types::{
     frame::{Frame, SequenceInfo},
     sequence::Sequence,
-    slam::{Checkpoint, Slam, SlamError},
-    synth::{SyntheticOptions, SyntheticSequence},
 };
-use mte_slam_tests::gpu_engine;
 use pollster::block_on;
 
 /// A recording in memory.

@@ -5,12 +5,10 @@ use crate::{
     message::*,
     run::Run,
 };
-use mte_slam_core::{
-    mesh::{write_glb, write_glb_by_class, write_ply},
-    metrics::{PosePair, ate},
-    slam::TrackingStatus,
-    trajectory_file::write_tum,
-};
+use mte_slam_core::slam::TrackingStatus;
+use mte_slam_mesh::{write_glb, write_glb_by_class, write_ply};
+use mte_slam_metrics::{PosePair, ate};
+use mte_slam_types::trajectory_file::write_tum;
 
 impl Run {
     pub async fn export(&mut self, export: &ExportCommand) -> Result<(), Failure> {

@@ -1,6 +1,7 @@
 //! Why a command was not followed.
 use crate::{feed::FeedError, message::*, settings::SettingsError};
-use mte_slam_core::{engine::EngineError, sequence::SequenceError, slam::SlamError};
+use mte_slam_core::{engine::EngineError, slam::SlamError};
+use mte_slam_types::sequence::SequenceError;
 
 /// See the module.
 pub struct Failure(pub ErrorEvent);

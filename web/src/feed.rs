@@ -2,7 +2,7 @@
 //! decoded frames from `mte-slam serve`, which the browser takes as fast as they are used.
 use crate::{message::ErrorKind, platform::sleep, source::last_part};
 use js_sys::{Reflect, Uint8Array};
-use mte_slam_core::{
+use mte_slam_types::{
     camera::Camera,
     classes::ClassTable,
     frame::{Bounds, Frame, SequenceInfo},

@@ -12,14 +12,12 @@ use crate::{
 };
 use js_sys::Reflect;
 use mte_slam_core::{
-    classes::ClassTable,
-    dataset::{self, LabelSource, OpenOptions},
     engine::{Engine, GpuOptions},
-    pose::Pose,
-    sequence::Source,
     slam::{LiveMesh, Slam},
-    synth::{SceneKind, SyntheticOptions, SyntheticSequence},
 };
+use mte_slam_dataset::{LabelSource, OpenOptions};
+use mte_slam_synth::{SceneKind, SyntheticOptions, SyntheticSequence};
+use mte_slam_types::{classes::ClassTable, pose::Pose, sequence::Source};
 use serde::de::DeserializeOwned;
 use wasm_bindgen::{JsCast, JsValue};
 
@@ -149,7 +147,7 @@ async fn open_feed(spec: &JsValue, settings: &Settings) -> Result<Feed, Failure>
         },
         ..OpenOptions::default()
     };
-    Ok(Feed::Sequence(dataset::open(source, options)?))
+    Ok(Feed::Sequence(mte_slam_dataset::open(source, options)?))
 }
 
 impl Run {

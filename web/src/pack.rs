@@ -1,6 +1,7 @@
 //! Mesh chunks as bytes that a renderer uploads as they are.
 use crate::message::ChunkData;
-use mte_slam_core::{classes::UNLABELLED, slam::MeshChunk};
+use mte_slam_core::slam::MeshChunk;
+use mte_slam_types::classes::UNLABELLED;
 
 /// Bytes a vertex.
 pub const VERTEX_BYTES: usize = 20;
@@ -25,7 +26,7 @@ pub fn chunk(chunk: &MeshChunk) -> ChunkData {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mte_slam_core::mesh::Mesh;
+    use mte_slam_mesh::Mesh;
 
     #[test]
     fn a_vertex_has_its_bytes_in_order() {

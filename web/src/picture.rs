@@ -1,8 +1,8 @@
 //! Images as RGBA for a page.
-use mte_slam_core::{
+use mte_slam_core::slam::View;
+use mte_slam_types::{
     classes::{ClassTable, UNLABELLED},
     frame::Frame,
-    slam::View,
 };
 
 /// Depth at which false colours end \[m\].
@@ -64,7 +64,7 @@ fn false_color(t: f32) -> [u8; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mte_slam_core::classes::Class;
+    use mte_slam_types::classes::Class;
 
     #[test]
     fn nothing_is_transparent_and_near_is_brighter_than_far() {

@@ -8,12 +8,9 @@ use crate::{
     platform::{clock_s, next_turn, wasm_bytes},
     settings::Settings,
 };
-use mte_slam_core::{
-    camera::Camera,
-    metrics::{PosePair, ate},
-    pose::Pose,
-    slam::{FrameReport, LiveMesh, MeshChunk, Slam, SlamError, TrackingStatus},
-};
+use mte_slam_core::slam::{FrameReport, LiveMesh, MeshChunk, Slam, SlamError, TrackingStatus};
+use mte_slam_metrics::{PosePair, ate};
+use mte_slam_types::{camera::Camera, pose::Pose};
 
 /// A recording under way.
 pub struct Run {

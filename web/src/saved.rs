@@ -4,7 +4,8 @@ use crate::{
     events::emit, failure::Failure, message::*, platform::clock_s, run::Run, settings::Settings,
 };
 use js_sys::Uint8Array;
-use mte_slam_core::{camera::Camera, frame::SequenceInfo, slam::Checkpoint};
+use mte_slam_core::slam::Checkpoint;
+use mte_slam_types::{camera::Camera, frame::SequenceInfo};
 use serde::{Deserialize, Serialize};
 
 /// Name of the metadata entry.

@@ -2,13 +2,14 @@
 //! Written here rather than by a library because its header order must not depend on a hash seed:
 //! the same run twice gives the same bytes.
 use super::{Checkpoint, Dtype, SlamError, Tensor};
-use crate::{hash::Hasher, safetensors};
+use crate::hash::Hasher;
 use alloc::{
     borrow::Cow,
     format,
     string::{String, ToString},
     vec::Vec,
 };
+use mte_slam_types::safetensors;
 use serde_json::{Map, Value, json};
 
 impl Dtype {

@@ -1,11 +1,8 @@
 //! The loop as a whole, on small frames of the built-in room.
 use super::*;
-use crate::{
-    camera::Camera,
-    sequence::Sequence,
-    synth::{SyntheticOptions, SyntheticSequence},
-};
+use crate::{camera::Camera, sequence::Sequence};
 use alloc::{vec, vec::Vec};
+use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
 use pollster::block_on;
 
 /// Focal length of the colour camera over that of the depth camera.
@@ -63,7 +60,7 @@ impl Unregistered {
 }
 
 fn psnr_db(a: &[[u8; 3]], b: &[[u8; 3]]) -> f64 {
-    crate::metrics::PsnrMeter::default().add(a, b).unwrap()
+    mte_slam_metrics::PsnrMeter::default().add(a, b).unwrap()
 }
 
 fn stored_color(slam: &mut Slam, slot: u32) -> Vec<[u8; 4]> {

@@ -1,3 +1,3 @@
-//! Estimating the camera's pose of each frame.
+//! Estimating the pose of each frame: where it starts ([`odometry`]) and how the field refines it.
 pub mod gauss_newton;
-pub mod odometry;
+pub use mte_slam_odometry as odometry;

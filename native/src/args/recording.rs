@@ -1,7 +1,7 @@
 //! Which recording is read, and how; and the commands that are about recordings alone.
 use super::at_least_one;
 use clap::{Args, ValueEnum, ValueHint};
-use mte_slam_core::dataset::GivenCamera;
+use mte_slam_dataset::GivenCamera;
 use std::path::PathBuf;
 
 /// Which part of a recording, and how it is read.

@@ -23,9 +23,9 @@ use crate::{
 use anyhow::{Context, Result, bail};
 use mte_slam_core::{
     config::{Config, Head, Inference},
-    sequence::Sequence,
     slam::{Slam, TrackingStatus},
 };
+use mte_slam_types::sequence::Sequence;
 use pollster::block_on;
 use std::{
     collections::BTreeMap,

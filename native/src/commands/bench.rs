@@ -15,17 +15,19 @@ use crate::{
 use anyhow::{Context, Result};
 use glam::DVec3;
 use mte_slam_core::{
-    camera::Camera,
     config::{Config, Head},
     engine::Engine,
     field::FieldShape,
-    frame::{Bounds, Frame},
     kernels::shared::{FLAG_GUIDED, FLAG_MAP, FLAG_MASK, FLAG_POSE},
     map::{
         Batch, FrameFormat, Map, Rates, Scratch, SemanticSupervision, fusion, passes, suppressor,
     },
-    pose::Pose,
     recording::{Command, Recording},
+};
+use mte_slam_types::{
+    camera::Camera,
+    frame::{Bounds, Frame},
+    pose::Pose,
 };
 use pollster::block_on;
 use serde::Serialize;

@@ -6,10 +6,8 @@ use crate::{
     screen::Screen,
 };
 use anyhow::{Context, Result};
-use mte_slam_core::{
-    dataset::{ColorFormat, RecordingWriter, ReplicaWriter, SensWriter, TumWriter},
-    sequence::Sequence,
-};
+use mte_slam_dataset::{ColorFormat, RecordingWriter, ReplicaWriter, SensWriter, TumWriter};
+use mte_slam_types::sequence::Sequence;
 use std::io::BufWriter;
 
 /// Write a recording in another layout.

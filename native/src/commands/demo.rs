@@ -8,7 +8,7 @@ use crate::{
     screen::Screen,
 };
 use anyhow::Result;
-use mte_slam_core::sequence::Sequence;
+use mte_slam_types::sequence::Sequence;
 use std::path::Path;
 
 /// Run SLAM on the built-in sequence.

@@ -15,15 +15,15 @@ use crate::{
 };
 use anyhow::{Context, Result, anyhow, bail};
 use image::{ColorType, DynamicImage};
-use mte_slam_core::{
+use mte_slam_core::slam::View;
+use mte_slam_mesh::read_ply;
+use mte_slam_metrics::PosePair;
+use mte_slam_odometry::ColourRegistration;
+use mte_slam_types::{
     classes::{ClassTable, UNLABELLED},
     frame::SequenceInfo,
-    mesh::read_ply,
-    metrics::PosePair,
     pose::Pose,
     sequence::Sequence,
-    slam::View,
-    track::odometry::ColourRegistration,
 };
 use std::path::Path;
 

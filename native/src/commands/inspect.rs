@@ -1,7 +1,7 @@
 //! `mte-slam inspect`.
 use crate::{args::InspectArgs, input, screen::Screen};
 use anyhow::{Context, Result, bail};
-use mte_slam_core::dataset::inspect::{
+use mte_slam_dataset::inspect::{
     DepthSummary, InspectOptions, Inspection, LabelSummary, PoseSummary, Severity, inspect,
 };
 use std::fmt::Write;

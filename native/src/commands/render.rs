@@ -6,7 +6,7 @@ use crate::{
     screen::Screen,
 };
 use anyhow::{Context, Result, bail};
-use mte_slam_core::pose::Pose;
+use mte_slam_types::pose::Pose;
 use pollster::block_on;
 
 /// Render a map from a checkpoint.

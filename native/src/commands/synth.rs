@@ -5,7 +5,7 @@ use crate::{
     synthetic,
 };
 use anyhow::Result;
-use mte_slam_core::synth::{SceneKind, SyntheticOptions};
+use mte_slam_synth::{SceneKind, SyntheticOptions};
 
 /// Write the built-in sequence to a folder.
 pub fn run(args: &SynthArgs, screen: Screen) -> Result<()> {

@@ -4,7 +4,8 @@ use super::{
     pictures::{Canvas, class_color},
 };
 use anyhow::Result;
-use mte_slam_core::{classes::ClassTable, metrics::ConfusionMatrix};
+use mte_slam_metrics::ConfusionMatrix;
+use mte_slam_types::classes::ClassTable;
 use std::fmt::Write;
 
 const PAPER: [u8; 3] = [255; 3];
@@ -180,10 +181,8 @@ pub fn csv(figures: &SemanticFigures, input: Option<&SemanticFigures>) -> String
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mte_slam_core::{
-        classes::{Class, UNLABELLED},
-        metrics::SemanticMeter,
-    };
+    use mte_slam_metrics::SemanticMeter;
+    use mte_slam_types::classes::{Class, UNLABELLED};
 
     fn table(n: u16) -> ClassTable {
         let class = |i| Class {

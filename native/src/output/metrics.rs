@@ -2,14 +2,12 @@
 //! that people read at the end of a run.
 use super::timings::Spread;
 use crate::resume::SavingFigures;
-use mte_slam_core::{
-    classes::{Class, ClassTable},
-    map::AnchorCounts,
-    metrics::{
-        AteReport, BoundaryReport, DepthReport, MeshDepthReport, PsnrReport, SMALL_SHARE_PERCENT,
-        SemanticReport, SurfaceReport,
-    },
+use mte_slam_core::map::AnchorCounts;
+use mte_slam_metrics::{
+    AteReport, BoundaryReport, DepthReport, MeshDepthReport, PsnrReport, SMALL_SHARE_PERCENT,
+    SemanticReport, SurfaceReport,
 };
+use mte_slam_types::classes::{Class, ClassTable};
 use serde::Serialize;
 use std::{collections::BTreeMap, fmt::Write};
 
@@ -555,9 +553,9 @@ mod tests {
         let mut m = Metrics { program: "p".to_owned(), ..Metrics::default() };
         m.lost_frames = (0..20).collect();
         m.absent.insert("mesh", "there is no true mesh".to_owned());
-        let pose = mte_slam_core::pose::Pose::IDENTITY;
-        let pair = mte_slam_core::metrics::PosePair { estimate: pose, truth: pose };
-        m.trajectory = mte_slam_core::metrics::ate(&[pair; 4]).ok();
+        let pose = mte_slam_types::pose::Pose::IDENTITY;
+        let pair = mte_slam_metrics::PosePair { estimate: pose, truth: pose };
+        m.trajectory = mte_slam_metrics::ate(&[pair; 4]).ok();
         let table = m.table();
         assert!(table.contains("no mesh: there is no true mesh"), "{table}");
         assert!(table.contains("0.000 cm") && table.contains("20 (0, 1"), "{table}");

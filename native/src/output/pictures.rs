@@ -2,7 +2,7 @@
 use super::font;
 use anyhow::{Context, Result};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
-use mte_slam_core::classes::{ClassTable, UNLABELLED};
+use mte_slam_types::classes::{ClassTable, UNLABELLED};
 
 /// 8-bit RGB.
 pub fn color_png(width: u32, height: u32, color: &[[u8; 3]]) -> Result<Vec<u8>> {
@@ -138,7 +138,7 @@ impl Canvas {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mte_slam_core::classes::Class;
+    use mte_slam_types::classes::Class;
 
     #[test]
     fn depth_and_class_pictures_read_back() {

@@ -4,10 +4,10 @@ use super::{
     pictures::{Canvas, class_color},
 };
 use anyhow::Result;
-use mte_slam_core::{
+use mte_slam_core::slam::View;
+use mte_slam_types::{
     classes::{ClassTable, UNLABELLED},
     frame::Frame,
-    slam::View,
 };
 use std::collections::BTreeSet;
 

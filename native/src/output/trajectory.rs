@@ -2,8 +2,8 @@
 //! seconds and metres; what `evo` reads.
 use anyhow::{Context, Result, bail};
 use glam::{DQuat, DVec3};
-use mte_slam_core::pose::Pose;
-pub use mte_slam_core::trajectory_file::write_tum;
+use mte_slam_types::pose::Pose;
+pub use mte_slam_types::trajectory_file::write_tum;
 
 /// Read such a file; `name` is for messages.
 pub fn read_tum(name: &str, text: &str) -> Result<Vec<(f64, Pose)>> {

@@ -5,12 +5,9 @@ use crate::output::{colormap::turbo, pictures::Canvas};
 use anyhow::{Context, Result, bail};
 use glam::{DMat3, DVec3};
 use image::{DynamicImage, ImageFormat, imageops::FilterType};
-use mte_slam_core::{
-    camera::Camera,
-    mesh::{Mesh, rasterise, read_ply},
-    metrics::distances_to_surface,
-    pose::Pose,
-};
+use mte_slam_mesh::{Mesh, rasterise, read_ply};
+use mte_slam_metrics::distances_to_surface;
+use mte_slam_types::{camera::Camera, pose::Pose};
 use std::{fs, io::Cursor, path::Path};
 
 /// Error at the top of the scale \[m\].

@@ -12,7 +12,8 @@ use crate::{
 };
 use anyhow::{Context, Result, bail};
 use glam::DVec3;
-use mte_slam_core::{metrics::PosePair, pose::Pose};
+use mte_slam_metrics::PosePair;
+use mte_slam_types::pose::Pose;
 use std::{fs, path::PathBuf};
 
 /// Time stamps that differ by less name the same frame \[s\].

@@ -6,11 +6,11 @@ use crate::{
     pipeline::process,
     screen::Screen,
 };
-use mte_slam_core::{
+use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
+use mte_slam_types::{
     frame::{Frame, SequenceInfo},
     pose::Pose,
     sequence::SequenceError,
-    synth::{SyntheticOptions, SyntheticSequence},
 };
 
 fn saver(out: &Path, saved: Option<usize>) -> Saver {

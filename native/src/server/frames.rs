@@ -4,7 +4,7 @@
 //! A frame is: length of the header (u32, little endian), the header (JSON: `index`, `number`,
 //! `time_s`, `labels`), colour (RGB, 3 bytes a pixel), depth (u16, little endian), and with labels
 //! compact classes (1 byte a pixel). In place of a frame that cannot be read: a header with `error`.
-use mte_slam_core::{frame::Frame, sequence::Sequence};
+use mte_slam_types::{frame::Frame, sequence::Sequence};
 use serde_json::json;
 use std::io::{self, Read};
 
@@ -74,12 +74,8 @@ fn encode(frame: &Frame, bytes: &mut Vec<u8>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mte_slam_core::{
-        frame::SequenceInfo,
-        pose::Pose,
-        sequence::SequenceError,
-        synth::{SyntheticOptions, SyntheticSequence},
-    };
+    use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
+    use mte_slam_types::{frame::SequenceInfo, pose::Pose, sequence::SequenceError};
     use std::{cell::Cell, rc::Rc};
 
     /// Counts the frames that were asked for, and fails from one on.

@@ -7,7 +7,7 @@ pub use page::Page;
 
 use anyhow::{Context, Result, anyhow};
 use frames::FrameReader;
-use mte_slam_core::sequence::Sequence;
+use mte_slam_types::sequence::Sequence;
 use std::{
     io::{self, Read},
     net::{IpAddr, SocketAddr},

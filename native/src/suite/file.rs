@@ -2,7 +2,7 @@
 use super::options;
 use crate::errors::usage;
 use anyhow::Result;
-use mte_slam_core::synth::{SceneKind, SyntheticOptions};
+use mte_slam_synth::{SceneKind, SyntheticOptions};
 use serde::{Deserialize, Serialize};
 use std::{
     collections::BTreeSet,

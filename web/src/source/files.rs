@@ -1,7 +1,7 @@
 //! Files that the user gave: dropped, picked, or of a picked folder.
 use super::MAX_FILE_BYTES;
 use js_sys::{Reflect, Uint8Array};
-use mte_slam_core::sequence::{SequenceError, Source, too_short};
+use mte_slam_types::sequence::{SequenceError, Source, too_short};
 use std::collections::BTreeMap;
 use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{Blob, FileReaderSync};

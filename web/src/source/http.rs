@@ -2,7 +2,7 @@
 //! listing pages that most servers make.
 use super::{MAX_FILE_BYTES, files::reason, last_part, listing};
 use js_sys::Uint8Array;
-use mte_slam_core::sequence::{SequenceError, Source, too_short};
+use mte_slam_types::sequence::{SequenceError, Source, too_short};
 use std::collections::BTreeSet;
 use wasm_bindgen::JsValue;
 use web_sys::{XmlHttpRequest, XmlHttpRequestResponseType};

@@ -1,9 +1,6 @@
 //! Archives: local ones are read in pieces, those on a server by ranges where it allows.
 use super::{MAX_FILE_BYTES, files::read_blob, http::ask, last_part};
-use mte_slam_core::{
-    dataset,
-    sequence::{SequenceError, Source},
-};
+use mte_slam_types::sequence::{SequenceError, Source};
 use std::io::{self, Read, Seek, SeekFrom};
 use web_sys::Blob;
 
@@ -64,7 +61,7 @@ impl Seek for Pieces {
 
 /// The files of an archive.
 pub struct ZipSource {
-    archive: dataset::ZipSource<Pieces>,
+    archive: mte_slam_dataset::ZipSource<Pieces>,
     /// Whether a server sent the whole archive because it knows no ranges.
     pub whole: bool,
 }
@@ -118,7 +115,7 @@ impl ZipSource {
     }
 
     fn new(name: &str, pieces: Pieces, whole: bool) -> Result<Self, SequenceError> {
-        Ok(Self { archive: dataset::ZipSource::new(name, pieces, MAX_FILE_BYTES)?, whole })
+        Ok(Self { archive: mte_slam_dataset::ZipSource::new(name, pieces, MAX_FILE_BYTES)?, whole })
     }
 }
 

@@ -1,0 +1,241 @@
+//! Which classes there are: from a file, or one of the lists that the field's data sets use.
+use super::folder::{invalid, shortened};
+use mte_slam_types::{
+    classes::{Class, ClassTable},
+    sequence::SequenceError,
+};
+use std::collections::BTreeMap;
+
+/// Ids, names and colours of classes, and the id that is none.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ClassList {
+    /// Where it comes from, for messages: a file, or `nyu40`.
+    pub name: String,
+    /// The classes, by id.
+    pub table: ClassTable,
+    /// The ids that mean "no label"; where empty 255 does, unless it is a class.
+    pub unlabelled: Vec<u16>,
+}
+
+/// The id that means "no label" when a list names none.
+pub(super) const DEFAULT_UNLABELLED: u16 = 255;
+
+impl ClassList {
+    /// The lists that need no file, by name.
+    pub const BUILT_IN: [&str; 2] = ["nyu40", "replica"];
+
+    /// A built-in list, `None` for any other name.
+    pub fn built_in(name: &str) -> Option<ClassList> {
+        match name {
+            "nyu40" => Some(ClassList::nyu40()),
+            "replica" => Some(ClassList::replica()),
+            _ => None,
+        }
+    }
+
+    /// The 40 classes of NYU Depth v2 in ScanNet's label images (`label-filt` mapped to `nyu40id`)
+    /// with ScanNet's colours; 0 is unlabelled.
+    pub fn nyu40() -> ClassList {
+        let class = |(i, (name, color)): (usize, &(&str, [u8; 3]))| Class {
+            raw_id: i as u16 + 1,
+            name: (*name).into(),
+            color: *color,
+        };
+        let table = ClassTable { classes: NYU40.iter().enumerate().map(class).collect() };
+        ClassList { name: "nyu40".into(), table, unlabelled: vec![0] }
+    }
+
+    /// Replica's 101 classes, with the ids of its `info_semantic.json`, as in the semantic renders
+    /// of Semantic-NeRF and vMAP; 0 is unlabelled. Replica fixes no colours.
+    pub fn replica() -> ClassList {
+        let class = |(i, name): (usize, &&str)| {
+            let raw_id = i as u16 + 1;
+            Class { raw_id, name: (*name).into(), color: class_color(raw_id) }
+        };
+        let table = ClassTable { classes: REPLICA.iter().enumerate().map(class).collect() };
+        ClassList { name: "replica".into(), table, unlabelled: vec![0] }
+    }
+
+    /// The list in `text`, the contents of `file`:
+    /// `{"7": {"name": "bed", "color": [86, 117, 191]}}`, colours optional. Classes
+    /// named `void`, `unlabelled` or `unlabeled` are none, but ids that mean "no label".
+    ///
+    /// # Errors
+    /// [`SequenceError::Invalid`] names the entry that is wrong.
+    pub fn parse(file: &str, text: &str) -> Result<ClassList, SequenceError> {
+        let error = |field: String, found: String, expected: &str| {
+            invalid(file, None, field, found, expected)
+        };
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let json: serde_json::Value = serde_json::from_str(text)
+            .map_err(|e| error("JSON".into(), e.to_string(), "a JSON document"))?;
+        let listed = json.as_object().ok_or_else(|| {
+            error("classes".into(), "no object".into(), r#"{"id": {"name": .., "color": ..}}"#)
+        })?;
+        let mut classes = BTreeMap::new();
+        for (key, value) in listed {
+            let id: u16 = key.parse().map_err(|_| {
+                error("class id".into(), shortened(key), "a whole number from 0 to 65535")
+            })?;
+            let name = value.get("name").and_then(|n| n.as_str()).ok_or_else(|| {
+                error(format!("class {id}: name"), shortened(&value.to_string()), "a text")
+            })?;
+            let color = match value.get("color") {
+                None => class_color(id),
+                Some(color) => serde_json::from_value(color.clone()).map_err(|_| {
+                    let found = shortened(&color.to_string());
+                    error(format!("class {id}: color"), found, "three numbers from 0 to 255")
+                })?,
+            };
+            if classes.insert(id, Class { raw_id: id, name: name.into(), color }).is_some() {
+                return Err(error("class id".into(), format!("{id} twice"), "each id once"));
+            }
+        }
+        let is_void = |c: &Class| {
+            let name = c.name.to_lowercase();
+            ["void", "unlabelled", "unlabeled"].contains(&name.as_str())
+        };
+        let (void, classes): (Vec<_>, Vec<_>) = classes.into_values().partition(is_void);
+        let unlabelled = void.iter().map(|c| c.raw_id).collect();
+        Ok(ClassList { name: file.into(), table: ClassTable { classes }, unlabelled })
+    }
+
+    /// The list of ids that have no names.
+    pub(super) fn unnamed(ids: impl IntoIterator<Item = u16>) -> ClassList {
+        let class = |id| Class { raw_id: id, name: format!("class {id}"), color: class_color(id) };
+        let table = ClassTable { classes: ids.into_iter().map(class).collect() };
+        ClassList { name: "the label images".into(), table, unlabelled: Vec::new() }
+    }
+
+    /// Takes `id` for one that means "no label".
+    pub(super) fn set_unlabelled(&mut self, id: u16) {
+        self.unlabelled.push(id);
+        self.table.classes.retain(|c| c.raw_id != id);
+    }
+
+    /// The ids that mean "no label".
+    pub(super) fn unlabelled_ids(&self) -> Vec<u16> {
+        let free = self.table.classes.iter().all(|c| c.raw_id != DEFAULT_UNLABELLED);
+        match self.unlabelled.as_slice() {
+            [] if free => vec![DEFAULT_UNLABELLED],
+            ids => ids.to_vec(),
+        }
+    }
+}
+
+/// A colour for a class without one: hues a golden ratio apart, in three brightnesses.
+pub fn class_color(id: u16) -> [u8; 3] {
+    let hue = f64::from(id) * 0.618_033_988_749_895 % 1.0 * 6.0;
+    let value = [240.0, 200.0, 160.0][usize::from(id % 3)];
+    let channel = |shift: f64| {
+        let k = (shift + hue) % 6.0;
+        let fall = k.min(4.0 - k).clamp(0.0, 1.0);
+        (value * (1.0 - 0.7 * fall)) as u8
+    };
+    [channel(5.0), channel(3.0), channel(1.0)]
+}
+
+/// Names and colours of the ids 1 to 40.
+#[rustfmt::skip]
+const NYU40: [(&str, [u8; 3]); 40] = [
+    ("wall", [174, 199, 232]), ("floor", [152, 223, 138]), ("cabinet", [31, 119, 180]),
+    ("bed", [255, 187, 120]), ("chair", [188, 189, 34]), ("sofa", [140, 86, 75]),
+    ("table", [255, 152, 150]), ("door", [214, 39, 40]), ("window", [197, 176, 213]),
+    ("bookshelf", [148, 103, 189]), ("picture", [196, 156, 148]), ("counter", [23, 190, 207]),
+    ("blinds", [178, 76, 76]), ("desk", [247, 182, 210]), ("shelves", [66, 188, 102]),
+    ("curtain", [219, 219, 141]), ("dresser", [140, 57, 197]), ("pillow", [202, 185, 52]),
+    ("mirror", [51, 176, 203]), ("floor mat", [200, 54, 131]), ("clothes", [92, 193, 61]),
+    ("ceiling", [78, 71, 183]), ("books", [172, 114, 82]), ("refrigerator", [255, 127, 14]),
+    ("television", [91, 163, 138]), ("paper", [153, 98, 156]), ("towel", [140, 153, 101]),
+    ("shower curtain", [158, 218, 229]), ("box", [100, 125, 154]), ("whiteboard", [178, 127, 135]),
+    ("person", [120, 185, 128]), ("nightstand", [146, 111, 194]), ("toilet", [44, 160, 44]),
+    ("sink", [112, 128, 144]), ("lamp", [96, 207, 209]), ("bathtub", [227, 119, 194]),
+    ("bag", [213, 92, 176]), ("otherstructure", [94, 106, 211]), ("otherfurniture", [82, 84, 163]),
+    ("otherprop", [100, 85, 144]),
+];
+
+/// Names of the ids 1 to 101.
+#[rustfmt::skip]
+const REPLICA: [&str; 101] = [
+    "backpack", "base-cabinet", "basket", "bathtub", "beam", "beanbag", "bed", "bench", "bike",
+    "bin", "blanket", "blinds", "book", "bottle", "box", "bowl", "camera", "cabinet", "candle",
+    "chair", "chopping-board", "clock", "cloth", "clothing", "coaster", "comforter",
+    "computer-keyboard", "cup", "cushion", "curtain", "ceiling", "cooktop", "countertop", "desk",
+    "desk-organizer", "desktop-computer", "door", "exercise-ball", "faucet", "floor", "handbag",
+    "hair-dryer", "handrail", "indoor-plant", "knife-block", "kitchen-utensil", "lamp", "laptop",
+    "major-appliance", "mat", "microwave", "monitor", "mouse", "nightstand", "pan", "panel",
+    "paper-towel", "phone", "picture", "pillar", "pillow", "pipe", "plant-stand", "plate", "pot",
+    "rack", "refrigerator", "remote-control", "scarf", "sculpture", "shelf", "shoe",
+    "shower-stall", "sink", "small-appliance", "sofa", "stair", "stool", "switch", "table",
+    "table-runner", "tablet", "tissue-paper", "toilet", "toothbrush", "towel", "tv-screen",
+    "tv-stand", "umbrella", "utensil-holder", "vase", "vent", "wall", "wall-cabinet", "wall-plug",
+    "wardrobe", "window", "rug", "logo", "bag", "set-of-clothing",
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    fn listed(text: &str) -> Result<ClassList, SequenceError> {
+        ClassList::parse("classes.json", text)
+    }
+
+    #[test]
+    fn class_lists_are_in_numeric_order_and_void_is_no_class() {
+        let text = r#"{"10": {"name": "bin", "color": [1, 2, 3]}, "9": {"name": "bed"},
+            "0": {"name": "Void"}}"#;
+        let mut list = listed(text).unwrap();
+        let ids: Vec<u16> = list.table.classes.iter().map(|c| c.raw_id).collect();
+        assert_eq!((ids, list.unlabelled_ids()), (vec![9, 10], vec![0]));
+        assert_eq!(list.table.classes[1].color, [1, 2, 3]);
+        list.set_unlabelled(9);
+        assert_eq!((list.table.len(), list.unlabelled_ids()), (1, vec![0, 9]));
+        assert!(listed(r#"{"255": {"name": "wall"}}"#).unwrap().unlabelled_ids().is_empty());
+        assert_eq!(listed(r#"{"1": {"name": "wall"}}"#).unwrap().unlabelled_ids(), [255]);
+        for (text, part) in [
+            ("[]", "no object"),
+            ("{", "JSON"),
+            (r#"{"a": {"name": "x"}}"#, "class id"),
+            (r#"{"70000": {"name": "x"}}"#, "class id"),
+            (r#"{"7": {}}"#, "class 7: name"),
+            (r#"{"7": {"name": "x", "color": [1, 2, 300]}}"#, "class 7: color"),
+            (r#"{"7": {"name": "x"}, "07": {"name": "y"}}"#, "7 twice"),
+        ] {
+            let e = listed(text).unwrap_err().to_string();
+            assert!(e.contains(part) && e.contains("classes.json"), "{text}: {e}");
+        }
+    }
+
+    #[test]
+    fn built_in_lists_have_the_ids_of_their_data_sets() {
+        let named = |list: &ClassList, id: u16| {
+            list.table.classes.iter().find(|c| c.raw_id == id).map(|c| c.name.clone()).unwrap()
+        };
+        for (name, count, known) in [
+            (
+                "nyu40",
+                40,
+                [(1, "wall"), (22, "ceiling"), (39, "otherfurniture"), (40, "otherprop")],
+            ),
+            ("replica", 101, [(1, "backpack"), (40, "floor"), (93, "wall"), (97, "window")]),
+        ] {
+            let list = ClassList::built_in(name).unwrap();
+            assert_eq!((list.table.len(), list.unlabelled_ids()), (count, vec![0]), "{name}");
+            for (id, expected) in known {
+                assert_eq!(named(&list, id), expected, "{name} {id}");
+            }
+            let names: BTreeSet<_> = list.table.classes.iter().map(|c| &c.name).collect();
+            let colors: BTreeSet<_> = list.table.classes.iter().map(|c| c.color).collect();
+            assert_eq!((names.len(), colors.len()), (count, count), "{name}");
+        }
+        assert_eq!(ClassList::nyu40().table.classes[35].color, [227, 119, 194]);
+        assert_eq!(ClassList::built_in("coco"), None);
+    }
+
+    #[test]
+    fn colours_differ() {
+        let colors: BTreeSet<[u8; 3]> = (0..255).map(class_color).collect();
+        assert!(colors.len() > 250, "{}", colors.len());
+    }
+}

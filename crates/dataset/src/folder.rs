@@ -1,0 +1,298 @@
+//! The files of a recording by name and by number, and the plain text among them.
+use mte_slam_types::{
+    pose::Pose,
+    sequence::{SequenceError, Source},
+};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Shorthand for [`SequenceError::Invalid`].
+pub(super) fn invalid(
+    file: &str,
+    frame: Option<u64>,
+    field: impl Into<String>,
+    found: impl Into<String>,
+    expected: impl Into<String>,
+) -> SequenceError {
+    SequenceError::Invalid {
+        file: file.into(),
+        frame,
+        field: field.into(),
+        found: found.into(),
+        expected: expected.into(),
+    }
+}
+
+/// More text than any recording has: a million poses of 16 numbers \[bytes\].
+const MAX_TEXT_BYTES: usize = 400 << 20;
+
+/// Files beside scenes that belong to all of them.
+const SHARED: [&str; 2] = ["cam_params.json", "scannetv2-labels.combined.tsv"];
+
+/// A source with its list of names, seen from the folder in which the recording lies.
+pub(super) struct Folder {
+    source: Box<dyn Source>,
+    /// Empty, or the folder of the recording inside the source, with a final `/`.
+    prefix: String,
+    all: BTreeSet<String>,
+    /// Names below `prefix`, without it.
+    names: BTreeSet<String>,
+}
+
+impl Folder {
+    /// Lists the source once.
+    pub fn new(source: Box<dyn Source>) -> Result<Self, SequenceError> {
+        let all: BTreeSet<String> = source.list()?.into_iter().collect();
+        let names = all.iter().filter(|n| !n.starts_with("../")).cloned().collect();
+        Ok(Self { source, prefix: String::new(), all, names })
+    }
+
+    /// When every file lies in one sub-folder (an unpacked archive often looks so), but for those
+    /// that scenes share, go there. Returns whether it did.
+    pub fn descend(&mut self) -> bool {
+        let own = || self.names.iter().filter(|n| !SHARED.contains(&n.as_str()));
+        let Some((top, _)) = own().next().and_then(|n| n.split_once('/')) else {
+            return false;
+        };
+        let top = format!("{top}/");
+        if !own().all(|n| n.starts_with(&top)) {
+            return false;
+        }
+        self.names =
+            self.names.iter().filter_map(|n| n.strip_prefix(&top)).map(String::from).collect();
+        self.prefix += &top;
+        true
+    }
+
+    /// The folder's name for messages.
+    pub fn name(&self) -> String {
+        match self.prefix.strip_suffix('/') {
+            Some(inner) => format!("{}/{inner}", self.source.name()),
+            None => self.source.name().into(),
+        }
+    }
+
+    /// Names of the files, sorted, relative to the recording's folder.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.names.iter().map(String::as_str)
+    }
+
+    /// Whether there is such a file.
+    pub fn has(&self, name: &str) -> bool {
+        self.names.contains(name)
+    }
+
+    /// `name` here, or one or two folders up where the source lets us see it.
+    pub fn here_or_above(&self, name: &str) -> Option<String> {
+        if self.has(name) {
+            return Some(name.into());
+        }
+        // Folders of the recording inside the source, the innermost first; then those outside.
+        let mut inside: Vec<&str> = self.prefix.split_terminator('/').collect();
+        let mut outside = String::new();
+        for _ in 0..2 {
+            if inside.pop().is_none() {
+                outside += "../";
+            }
+            let folder: String = inside.iter().map(|part| format!("{part}/")).collect();
+            let above = format!("{outside}{folder}{name}");
+            if self.all.contains(&above) {
+                // The '/' in front marks a name relative to the source, not to the recording.
+                return Some(format!("/{above}"));
+            }
+        }
+        None
+    }
+
+    /// The name that the source knows a file by.
+    fn in_source(&self, name: &str) -> Result<String, SequenceError> {
+        match name.strip_prefix('/') {
+            Some(of_source) => Ok(of_source.into()),
+            None if self.has(name) => Ok(format!("{}{name}", self.prefix)),
+            None => Err(SequenceError::Read {
+                file: name.into(),
+                reason: format!("no such file in {}", self.name()),
+            }),
+        }
+    }
+
+    /// The bytes of a file.
+    pub fn read(&self, name: &str) -> Result<Vec<u8>, SequenceError> {
+        self.source.read(&self.in_source(name)?)
+    }
+
+    /// The length of a file \[bytes\].
+    pub fn size(&self, name: &str) -> Result<u64, SequenceError> {
+        self.source.size(&self.in_source(name)?)
+    }
+
+    /// Some of the bytes of a file.
+    pub fn read_range(
+        &self,
+        name: &str,
+        offset: u64,
+        bytes: usize,
+    ) -> Result<Vec<u8>, SequenceError> {
+        self.source.read_range(&self.in_source(name)?, offset, bytes)
+    }
+
+    /// A text file, without a byte order mark.
+    pub fn text(&self, name: &str) -> Result<String, SequenceError> {
+        let bytes = self.read(name)?;
+        if bytes.len() > MAX_TEXT_BYTES {
+            let (found, limit) = (format!("{} bytes", bytes.len()), MAX_TEXT_BYTES);
+            return Err(invalid(name, None, "text", found, format!("at most {limit} bytes")));
+        }
+        let text = String::from_utf8(bytes).map_err(|e| {
+            let at = e.utf8_error().valid_up_to();
+            invalid(name, None, "text", format!("no UTF-8 at byte {at}"), "UTF-8 text")
+        })?;
+        Ok(match text.strip_prefix('\u{feff}') {
+            Some(rest) => rest.into(),
+            None => text,
+        })
+    }
+
+    /// A JSON file.
+    pub fn json(&self, name: &str) -> Result<serde_json::Value, SequenceError> {
+        serde_json::from_str(&self.text(name)?)
+            .map_err(|e| invalid(name, None, "JSON", e.to_string(), "a JSON document"))
+    }
+
+    /// All files `START number END` for one of the ends, by number. Digits may or may not be
+    /// zero-padded; two files with one number are an error.
+    pub fn numbered(
+        &self,
+        start: &str,
+        ends: &[&str],
+    ) -> Result<BTreeMap<u64, String>, SequenceError> {
+        let mut found = BTreeMap::new();
+        for name in self.names.iter().filter(|n| n.starts_with(start)) {
+            let Some(number) = ends.iter().find_map(|end| number_between(name, start, end)) else {
+                continue;
+            };
+            if let Some(other) = found.insert(number, name.clone()) {
+                return Err(invalid(
+                    name,
+                    Some(number),
+                    "frame number",
+                    format!("also in {other}"),
+                    "one file for each number",
+                ));
+            }
+        }
+        Ok(found)
+    }
+
+    /// How many files match, for messages.
+    pub fn count(&self, start: &str, ends: &[&str]) -> usize {
+        self.names
+            .iter()
+            .filter(|n| ends.iter().any(|e| number_between(n, start, e).is_some()))
+            .count()
+    }
+}
+
+/// The number in `START digits END`.
+pub(super) fn number_between(name: &str, start: &str, end: &str) -> Option<u64> {
+    let digits = name.strip_prefix(start)?.strip_suffix(end)?;
+    digits.bytes().all(|b| b.is_ascii_digit()).then(|| digits.parse().ok()).flatten()
+}
+
+/// A pose as 16 row-major numbers. `Ok(None)` when any of them is not finite, which is how data
+/// sets say "no pose".
+pub(super) fn parse_matrix(
+    file: &str,
+    frame: Option<u64>,
+    text: &str,
+) -> Result<Option<Pose>, SequenceError> {
+    let numbers = parse_numbers(file, frame, text)?;
+    let matrix: &[f64; 16] = numbers.as_slice().try_into().map_err(|_| {
+        invalid(file, frame, "pose", format!("{} numbers", numbers.len()), "16 numbers")
+    })?;
+    if matrix.iter().any(|x| !x.is_finite()) {
+        return Ok(None);
+    }
+    match Pose::from_row_major(matrix) {
+        Some(pose) => Ok(Some(pose)),
+        None => Err(invalid(
+            file,
+            frame,
+            "pose",
+            "a matrix whose upper left 3x3 block is not a rotation",
+            "a rigid transform, world_from_camera",
+        )),
+    }
+}
+
+/// All numbers of a text, separated by white space.
+pub(super) fn parse_numbers(
+    file: &str,
+    frame: Option<u64>,
+    text: &str,
+) -> Result<Vec<f64>, SequenceError> {
+    text.split_whitespace()
+        .map(|word| {
+            word.parse()
+                .map_err(|_| invalid(file, frame, "number", shortened(word), "a decimal number"))
+        })
+        .collect()
+}
+
+/// A quoted word, cut to a length that fits a message.
+pub(super) fn shortened(word: &str) -> String {
+    let short: String = word.chars().take(40).collect();
+    format!("{short:?}{}", if short.len() < word.len() { "..." } else { "" })
+}
+
+/// `n thing` or `n things`.
+pub(super) fn plural(n: usize, thing: &str) -> String {
+    format!("{n} {thing}{}", if n == 1 { "" } else { "s" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::MemorySource;
+
+    fn folder(names: &[&str]) -> Folder {
+        let mut m = MemorySource::new("m");
+        for n in names {
+            m.insert(*n, *n);
+        }
+        Folder::new(Box::new(m)).unwrap()
+    }
+
+    #[test]
+    fn numbers_sort_as_numbers_and_other_files_are_not_taken() {
+        let f = folder(&["a_10.png", "a_9.png", "a_.png", "a_1x.png", "a_+3.png", "vis_a_2.png"]);
+        let got: Vec<_> = f.numbered("a_", &[".png"]).unwrap().into_iter().collect();
+        assert_eq!(got, [(9, "a_9.png".into()), (10, "a_10.png".into())]);
+        assert!(folder(&["a1.png", "a01.png"]).numbered("a", &[".png"]).is_err());
+    }
+
+    #[test]
+    fn one_common_folder_is_entered_and_the_one_above_is_seen() {
+        let mut f = folder(&["x/y/a.txt", "x/y/b/c.txt"]);
+        assert!(f.descend() && f.descend() && !f.descend());
+        assert_eq!(f.names().collect::<Vec<_>>(), ["a.txt", "b/c.txt"]);
+        assert_eq!(f.read("a.txt").unwrap(), b"x/y/a.txt");
+        assert_eq!(f.name(), "m/x/y");
+
+        assert_eq!(f.here_or_above("cam.json"), None);
+        for above in ["x/cam.json", "cam.json"] {
+            let mut f = folder(&["x/y/a.txt", above]);
+            f.prefix = "x/y/".into();
+            f.names.remove(above);
+            let found = f.here_or_above("cam.json").unwrap();
+            assert_eq!(f.text(&found).unwrap(), above);
+        }
+
+        let f = folder(&["../cam.json", "../../table.tsv", "a"]);
+        for name in ["cam.json", "table.tsv"] {
+            let above = f.here_or_above(name).unwrap();
+            assert!(f.text(&above).unwrap().ends_with(name));
+        }
+        assert_eq!(f.names().collect::<Vec<_>>(), ["a"]);
+        assert!(f.read("../cam.json").is_err() && f.read("../../etc/passwd").is_err());
+    }
+}

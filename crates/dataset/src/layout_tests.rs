@@ -1,0 +1,256 @@
+//! What is particular to ScanNet, packed recordings, nerfstudio and plain folders.
+use super::{test_support::*, *};
+use mte_slam_types::{
+    classes::UNLABELLED,
+    pose::Pose,
+    sequence::{SequenceError, Source},
+};
+
+fn assert_has(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "{part:?} is not in: {text}");
+    }
+}
+
+/// A text file with something replaced.
+fn replace(m: &mut MemorySource, file: &str, from: &str, to: &str) {
+    let text = String::from_utf8(m.get(file).unwrap().to_vec()).unwrap();
+    assert!(text.contains(from), "{from} is not in {text}");
+    m.insert(file, text.replacen(from, to, 1));
+}
+
+fn png_of(w: u32, h: u32, value: u16) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let image = image::ImageBuffer::<image::Luma<u16>, _>::from_pixel(w, h, image::Luma([value]));
+    image.write_to(&mut std::io::Cursor::new(&mut bytes), image::ImageFormat::Png).unwrap();
+    bytes
+}
+
+/// Files that may only be read in parts of a bounded length.
+struct InParts {
+    files: MemorySource,
+    longest: usize,
+}
+
+impl Source for InParts {
+    fn name(&self) -> &str {
+        self.files.name()
+    }
+
+    fn list(&self) -> Result<Vec<String>, SequenceError> {
+        self.files.list()
+    }
+
+    fn read(&self, file: &str) -> Result<Vec<u8>, SequenceError> {
+        assert!(!file.ends_with(".sens"), "{file} is read as a whole");
+        self.files.read(file)
+    }
+
+    fn size(&self, file: &str) -> Result<u64, SequenceError> {
+        self.files.size(file)
+    }
+
+    fn read_range(&self, file: &str, offset: u64, bytes: usize) -> Result<Vec<u8>, SequenceError> {
+        assert!(bytes <= self.longest, "{bytes} bytes of {file} at once");
+        self.files.read_range(file, offset, bytes)
+    }
+}
+
+#[test]
+fn packed_recordings_are_read_in_parts() {
+    let files = sens(12);
+    let size = files.get("tiny.sens").unwrap().len();
+    let source = InParts { files, longest: size / 6 };
+    let mut s = open(Box::new(source), OpenOptions::default()).unwrap();
+    for i in [0, 11, 5] {
+        let got = s.frame(i).unwrap();
+        assert_eq!((got.color, got.depth), (frame(i).color, frame(i).depth));
+    }
+    let mut m = sens(2);
+    let other = m.get("tiny.sens").unwrap().to_vec();
+    m.insert("other.sens", other);
+    assert_has(&error_of(&m, OpenOptions::default()), &["other.sens, tiny.sens", "one .sens file"]);
+}
+
+/// Exported ScanNet with raw ids: 0, 7 and 300 are classes of the tiny recording.
+fn scannet() -> MemorySource {
+    let mut m = renamed(3, Layout::ScanNet);
+    for i in 0..3 {
+        let labels = m.remove(&format!("semantic_class/semantic_class_{i}.png")).unwrap();
+        m.insert(format!("label-filt/{i}.png"), labels);
+    }
+    m.remove("classes.json");
+    m
+}
+
+const TABLE: &str = "scannetv2-labels.combined.tsv";
+
+#[test]
+fn raw_ids_are_translated_by_the_table_wherever_it_lies() {
+    let table = "id\tcategory\tnyu40id\n0\tx\t\n7\tbed\t4\n300\tcup\t40\n";
+    for place in [TABLE.to_string(), format!("../{TABLE}"), format!("../../{TABLE}")] {
+        let mut m = scannet();
+        m.insert(place.clone(), table);
+        let mut s = opened(&m).unwrap();
+        assert_eq!(s.info().classes.len(), 40, "{place}");
+        let labels = s.frame(1).unwrap().labels.unwrap();
+        for (got, want) in labels.iter().zip(frame(1).labels.unwrap()) {
+            // "floor" is 0, which has no class in the table.
+            assert_eq!(*got, [UNLABELLED, 3, 39].get(usize::from(want)).copied().unwrap_or(255));
+        }
+        // The same labels from elsewhere, by the name of their folder.
+        let mut elsewhere = MemorySource::new("scene0000_00_2d-label-filt");
+        for i in 0..3 {
+            let file = format!("label-filt/{i}.png");
+            elsewhere.insert(file.clone(), m.remove(&file).unwrap());
+        }
+        let labels = LabelSource::Folder(Box::new(elsewhere));
+        let mut s = open(Box::new(m), OpenOptions { labels, ..Default::default() }).unwrap();
+        assert_eq!(s.frame(1).unwrap().labels.unwrap()[5], 3, "{place}");
+    }
+    // Without the table the raw ids are classes, and 0 is none.
+    let s = opened(&scannet()).unwrap();
+    let ids: Vec<u16> = s.info().classes.classes.iter().map(|c| c.raw_id).collect();
+    assert_eq!(ids, [1, 7, 300]);
+    for (text, parts) in [
+        ("", &["columns", "named id"][..]),
+        ("id\tname\n1\tx\n", &["columns", "named nyu40id"]),
+        ("id\tnyu40id\n70000\t1\n", &["line 2", "0 to 65535"]),
+        ("id\tnyu40id\n5\t1\n6\t41\n", &["line 3", "0 to 40"]),
+        ("id\tnyu40id\nx\t1\n", &["line 2", "an id"]),
+    ] {
+        let mut m = scannet();
+        m.insert(TABLE, text);
+        let e = error_of(&m, OpenOptions::default());
+        assert_has(&e, &[TABLE]);
+        assert_has(&e, parts);
+    }
+}
+
+#[test]
+fn exported_cameras_and_lost_poses() {
+    let mut m = scannet();
+    m.remove("cam_params.json");
+    m.insert("pose/1.txt", ["-inf"; 16].join(" "));
+    m.remove("pose/2.txt");
+    let usual = error_of(&m, OpenOptions::default());
+    assert_has(&usual, &["24x16", "640x480", "there is no intrinsic/intrinsic_depth.txt"]);
+    m.insert("intrinsic/intrinsic_depth.txt", "20 0 11.5 0 0 21 7.25 0 0 0 1 0 0 0 0 1");
+    m.insert("intrinsic/intrinsic_color.txt", "20 0 11.5 0 0 21 7.25 0 0 0 1 0 0 0 0 1");
+    let s = opened(&m).unwrap();
+    assert_eq!(s.info().camera, info().camera);
+    assert_eq!(
+        [s.truth(0).is_some(), s.truth(1).is_some(), s.truth(2).is_some()],
+        [true, false, false]
+    );
+    assert_has(&s.warnings().join(";"), &["2 frames without a ground-truth pose"]);
+    assert!(!s.warnings().join(";").contains("beside it"));
+    // A colour camera three pixels to the right.
+    m.insert("intrinsic/intrinsic_color.txt", "20 0 14.5 0 0 21 7.25 0 0 0 1 0 0 0 0 1");
+    assert_has(&opened(&m).unwrap().warnings().join(";"), &["up to 3.0 pixels beside it"]);
+    m.insert("intrinsic/intrinsic_depth.txt", "20 0 11.5");
+    assert_has(&error_of(&m, OpenOptions::default()), &["intrinsic_depth.txt", "3 numbers", "4x4"]);
+}
+
+#[test]
+fn transforms_are_read_as_they_are_meant() {
+    let m = renamed(3, Layout::Nerfstudio);
+    let s = opened(&m).unwrap();
+    assert_has(&s.warnings().join(";"), &["another order"]);
+    let changed = |from: &str, to: &str| {
+        let mut m = m.clone();
+        replace(&mut m, nerfstudio::FILE, from, to);
+        m
+    };
+    let error = |from: &str, to: &str| error_of(&changed(from, to), OpenOptions::default());
+    assert_has(&error("OPENCV", "OPENCV_FISHEYE"), &["camera_model", "OPENCV_FISHEYE", "PINHOLE"]);
+    assert_has(&error("\"fl_x\"", "\"fl\""), &["fl_x", "nothing", "camera_angle_x"]);
+    assert_has(&error("\"w\":24", "\"w\":24.5"), &["w: found 24.5"]);
+    assert_has(
+        &error("images/1.png", "images/../../1.png"),
+        &["images/../../1.png", "no such file"],
+    );
+    assert_has(&error("images/1.png", "/etc/hostname"), &["no such file"]);
+    assert_has(&error("\"frames\"", "\"frame\""), &["frames", "a list of frames"]);
+    assert_has(&error("{", "{\"k4\": 0.1, "), &["k4"]);
+    assert_has(&error("integer_depth_scale\":", "integer_depth_scale\":-"), &["metres per unit"]);
+    // Depth of one frame is missing, and the pose of another.
+    let mut m = changed("depth_file_path", "depth_file");
+    replace(&mut m, nerfstudio::FILE, "transform_matrix", "transform");
+    let s = opened(&m).unwrap();
+    assert_eq!(s.info().frames, 2);
+    assert_has(&s.warnings().join(";"), &["1 frame without depth left out"]);
+    // A field of view in place of a focal length, in other files.
+    let angle = 2.0 * (12.0f64 / 20.0).atan();
+    let m = changed("\"fl_x\":20.0", &format!("\"camera_angle_x\":{angle}"));
+    assert!((opened(&m).unwrap().info().camera.fx - 20.0).abs() < 1e-9);
+}
+
+#[test]
+fn plain_folders_are_paired_by_number_or_by_order() {
+    let m = renamed(3, Layout::Images);
+    let mut other = m.clone();
+    for i in 0..3 {
+        let depth = other.remove(&format!("depth/view{i}.png")).unwrap();
+        other.insert(format!("depth/{}.png", 100 + i), depth);
+    }
+    let mut s = opened(&other).unwrap();
+    assert_has(&s.warnings().join(";"), &["paired by their order"]);
+    assert_eq!(s.frame(2).unwrap().depth, frame(2).depth);
+    other.remove("depth/102.png");
+    assert_has(&error_of(&other, OpenOptions::default()), &["3 colour and 2 depth images"]);
+    let mut fewer = m.clone();
+    fewer.remove("depth/view1.png");
+    let s = opened(&fewer).unwrap();
+    assert_eq!((s.info().frames, s.number(1)), (2, 2));
+    assert_has(&s.warnings().join(";"), &["1 image without its partner"]);
+    // The pose is that of its number, though there are fewer frames than lines.
+    let off = s.truth(1).unwrap().translation - frame(2).truth.unwrap().translation;
+    assert!(off.length() < 1e-9);
+}
+
+#[test]
+fn a_camera_a_unit_and_axes_may_be_given() {
+    let mut m = renamed(2, Layout::Images);
+    m.remove("intrinsics.json");
+    assert_has(&error_of(&m, OpenOptions::default()), &["images needs", "intrinsics.json"]);
+    let camera = GivenCamera::from_numbers(&[30.0, 31.0, 11.0, 7.0]);
+    let options = || OpenOptions { camera, ..Default::default() };
+    let s = open(Box::new(m.clone()), options()).unwrap();
+    let c = s.info().camera;
+    assert_eq!((c.fx, c.fy, c.cx, c.cy), (30.0, 31.0, 11.0, 7.0));
+    assert_eq!(s.info().depth_unit_m, 1e-3);
+    let with = OpenOptions { depth_scale: Some(4000.0), axes: Axes::OpenGl, ..options() };
+    let s = open(Box::new(m.clone()), with).unwrap();
+    assert_eq!(s.info().depth_unit_m, 1.0 / 4000.0);
+    let expected: Pose = frame(1).truth.unwrap().with_flipped_camera();
+    assert!((s.truth(1).unwrap().translation - expected.translation).length() < 1e-9);
+    assert!(s.truth(1).unwrap().compose(&expected.inverse()).angle_rad() < 1e-7);
+    for depth_scale in [0.0, -1.0, f64::NAN] {
+        let with = OpenOptions { depth_scale: Some(depth_scale), ..options() };
+        assert_has(&error_of(&m, with), &["depth scale", "> 0"]);
+    }
+    let camera = GivenCamera::from_numbers(&[0.0, 31.0, 11.0, 7.0]);
+    let e = error_of(&m, OpenOptions { camera, ..Default::default() });
+    assert_has(&e, &["the camera given", "fx and fy > 0"]);
+    assert_eq!(GivenCamera::from_numbers(&[1.0; 5]), None);
+    // It replaces what a file says, too, and that file's unit of depth stays.
+    let s = open(Box::new(replica(2)), options()).unwrap();
+    assert_eq!(s.info().camera.fx, 30.0);
+    assert!((s.info().depth_unit_m * 5000.0 - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn images_of_too_many_pixels_are_refused() {
+    let mut m = replica(1);
+    // 16000 x 16000 is within the limit of each side.
+    let mut png = png_of(1, 1, 0);
+    png[16..24].copy_from_slice(&[0, 0, 62, 128, 0, 0, 62, 128]);
+    let crc = !png[12..29].iter().fold(!0u32, |crc, &b| {
+        (0..8).fold(crc ^ u32::from(b), |c, _| (c >> 1) ^ (0xedb8_8320 * (c & 1)))
+    });
+    png[29..33].copy_from_slice(&crc.to_be_bytes());
+    m.insert("results/depth000000.png", png);
+    let e = error_of(&m, OpenOptions::default());
+    assert_has(&e, &["depth000000.png", "16000x16000", &MAX_PIXELS.to_string()]);
+}

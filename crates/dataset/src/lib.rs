@@ -1,0 +1,72 @@
+//! Recordings on disk, in an archive or in a browser, by the layout of their files.
+//!
+//! | layout | colour | depth | poses | labels |
+//! | --- | --- | --- | --- | --- |
+//! | `replica` | `results/frame000000.jpg` | `results/depth000000.png`, 1/6553.5 m | `traj.txt` | `semantic_class/` |
+//! | `replica-vmap` | `rgb/rgb_0.png` | `depth/depth_0.png`, mm | `traj.txt`, `traj_w_c.txt` | `semantic_class/` |
+//! | `tum` | `rgb.txt` | `depth.txt`, 1/5000 m | `groundtruth.txt` | `semantic_class/` |
+//! | `7scenes` | `frame-000000.color.png` | `frame-000000.depth.png`, mm | `frame-000000.pose.txt` | `semantic_class/` |
+//! | `scannet` | `color/0.jpg` | `depth/0.png`, mm | `pose/0.txt` | `label-filt/0.png` |
+//! | `sens` | in `NAME.sens` | there, in its unit | there | `label-filt/0.png` |
+//! | `nerfstudio` | `transforms.json` | there, mm unless it says | there (OpenGL axes) | `semantic_class/` |
+//! | `images` | `color/*`, `rgb/*`, `images/*` | `depth/*.png`, mm unless the camera says | `pose/0.txt`, `traj.txt`, `poses.txt` | `semantic_class/` |
+//!
+//! Files that any layout may hold beside its own:
+//! - the camera: `cam_params.json` (`{"camera": {w, h, fx, fy, cx, cy, scale}}`, `scale` in depth
+//!   units per metre, `k1 k2 p1 p2 k3` if there is distortion; also up to two folders up),
+//!   `intrinsics.json` (the inner object alone, `depth_scale` for `scale`; it marks the layout
+//!   `images`, and fits images of its proportions in another size), `camera-intrinsics.txt` (a
+//!   3x3 or 4x4 matrix) or `camera.txt` (`fx fy cx cy [k1 k2 p1 p2 k3]`);
+//! - feature maps, in a folder of their own: `000000.npy` or `000000.safetensors` (the tensor
+//!   `features`, or the only one), ... by frame number, channels x height x width, float32 or
+//!   float16;
+//! - `bound.json`: `{"bound": [[x0, x1], [y0, y1], [z0, z1]]}` in metres;
+//! - `classes.json`: `{"7": {"name": "bed", "color": [86, 117, 191]}}`, colour optional. Without
+//!   it a [`ClassList`] can be given, and else every id in the images is a class;
+//! - `scannetv2-labels.combined.tsv` (or up to two folders up): the raw ids in `label-filt/` are
+//!   then translated to NYU's 40 classes.
+//!
+//! Archives of any of them are read in place ([`ZipSource`]).
+//!
+//! Frames are in numeric order, and the world frame is the data set's own.
+extern crate alloc;
+
+mod class_list;
+mod decode;
+mod entries;
+mod features;
+mod folder;
+#[cfg(fuzzing)]
+pub mod fuzzing;
+mod images;
+pub mod inspect;
+mod intrinsics;
+mod labels;
+mod layout;
+mod memory;
+mod nerfstudio;
+mod reader;
+mod resize;
+mod scannet;
+mod sens;
+mod stored;
+mod tum;
+mod write;
+mod zip;
+
+pub use class_list::{ClassList, class_color};
+pub use decode::{MAX_PIXELS, MAX_SIDE};
+pub use layout::Layout;
+pub use memory::MemorySource;
+pub use reader::{Axes, GivenCamera, LabelSource, OpenOptions, open};
+pub use write::{ColorFormat, RecordingWriter, ReplicaWriter, SensWriter, TumWriter, WriteError};
+pub use zip::ZipSource;
+
+#[cfg(test)]
+mod bad_input_tests;
+#[cfg(test)]
+mod data_tests;
+#[cfg(test)]
+mod layout_tests;
+#[cfg(test)]
+mod test_support;

@@ -1,0 +1,399 @@
+//! Opening a recording, and decoding its frames.
+use super::{
+    class_list::ClassList,
+    decode::Size,
+    entries::{self, Entry},
+    features::Features,
+    folder::{Folder, invalid, plural},
+    intrinsics::{Intrinsics, Rectifier, checked},
+    labels::{Labels, Wanted},
+    layout::Layout,
+    resize::{Resize, same_aspect},
+};
+use mte_slam_types::{
+    classes::ClassTable,
+    frame::{Frame, SequenceInfo},
+    pose::Pose,
+    sequence::{Sequence, SequenceError, Source},
+};
+
+/// Smallest side of a scaled image \[pixels\].
+const MIN_SIDE: u32 = 8;
+
+/// Where labels come from.
+#[derive(Default)]
+pub enum LabelSource {
+    /// No labels.
+    None,
+    /// The recording's own `semantic_class/` folder, if it has one.
+    #[default]
+    Dataset,
+    /// PNGs of ids made by anyone, named like the colour or depth images or by frame number. Its
+    /// own `classes.json` counts before the recording's.
+    Folder(Box<dyn Source>),
+}
+
+/// A camera given by people, of images of any size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GivenCamera {
+    /// fx, fy, cx, cy \[pixels\]; the centre of the first pixel is (0, 0).
+    pub focal_centre: [f64; 4],
+    /// k1, k2, p1, p2, k3 of OpenCV's distortion.
+    pub distortion: [f64; 5],
+}
+
+impl GivenCamera {
+    /// From `fx fy cx cy`, or from these and `k1 k2 p1 p2 k3`.
+    pub fn from_numbers(numbers: &[f64]) -> Option<GivenCamera> {
+        match *numbers {
+            [fx, fy, cx, cy] => {
+                Some(GivenCamera { focal_centre: [fx, fy, cx, cy], distortion: [0.0; 5] })
+            }
+            [fx, fy, cx, cy, k1, k2, p1, p2, k3] => Some(GivenCamera {
+                focal_centre: [fx, fy, cx, cy],
+                distortion: [k1, k2, p1, p2, k3],
+            }),
+            _ => None,
+        }
+    }
+
+    /// All nine numbers, as [`GivenCamera::from_numbers`] takes them.
+    pub fn numbers(&self) -> Vec<f64> {
+        self.focal_centre.iter().chain(&self.distortion).copied().collect()
+    }
+}
+
+/// Axes of a camera.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Axes {
+    /// x right, y down, z forward, as everywhere here.
+    #[default]
+    OpenCv,
+    /// x right, y up, z backward, as OpenGL, Blender and nerfstudio have it.
+    OpenGl,
+}
+
+impl Axes {
+    /// Names on the command line.
+    pub const NAMES: [&str; 2] = ["opencv", "opengl"];
+
+    /// From its name.
+    pub fn named(name: &str) -> Option<Axes> {
+        match name {
+            "opencv" => Some(Axes::OpenCv),
+            "opengl" => Some(Axes::OpenGl),
+            _ => None,
+        }
+    }
+}
+
+/// What of a recording is read, and how.
+pub struct OpenOptions {
+    /// The layout, or `None` to recognise it by its files.
+    pub layout: Option<Layout>,
+    /// The camera of the depth images, instead of any file's.
+    pub camera: Option<GivenCamera>,
+    /// Units of depth per metre, instead of the layout's.
+    pub depth_scale: Option<f64>,
+    /// How the cameras of the ground-truth poses lie. Layouts with axes of their own (nerfstudio)
+    /// are turned before; the default is right for them.
+    pub axes: Axes,
+    /// First frame, counted from 0 in the recording's order.
+    pub start: usize,
+    /// Every how manieth frame is used, at least 1.
+    pub stride: usize,
+    /// At most so many frames are used.
+    pub frames: Option<usize>,
+    /// Images are made smaller by this factor, in (0, 1]: colour by averaging, depth and labels
+    /// by nearest pixel.
+    pub scale: f64,
+    /// Where labels come from.
+    pub labels: LabelSource,
+    /// Feature maps of the colour images: `000000.npy` or `000000.safetensors`, ... by frame number,
+    /// float32 or float16, channels x height x width, each over the whole image as it is stored.
+    pub features: Option<Box<dyn Source>>,
+    /// The classes, instead of those of any `classes.json`.
+    pub classes: Option<ClassList>,
+    /// The raw label id that means "no label". By default the class named `void`, `unlabelled`
+    /// or `unlabeled` in `classes.json`, or else 255 unless that is a listed class.
+    pub unlabelled_raw_id: Option<u16>,
+    /// Drop listed classes that no label image of the frames in use shows (all of them are then
+    /// decoded once at opening).
+    pub only_present_classes: bool,
+}
+
+impl Default for OpenOptions {
+    fn default() -> Self {
+        Self {
+            layout: None,
+            camera: None,
+            depth_scale: None,
+            axes: Axes::default(),
+            start: 0,
+            stride: 1,
+            frames: None,
+            scale: 1.0,
+            labels: LabelSource::default(),
+            features: None,
+            classes: None,
+            unlabelled_raw_id: None,
+            only_present_classes: false,
+        }
+    }
+}
+
+/// Opens a recording: lists the files, reads poses, camera and classes, and checks that every
+/// frame in use has its files. Images are decoded frame by frame later.
+///
+/// # Errors
+/// Any [`SequenceError`]: an unknown layout, missing files, a file that is not what it should be
+/// (with what was found and what was expected), or options that make no sense.
+pub fn open(
+    source: Box<dyn Source>,
+    options: OpenOptions,
+) -> Result<Box<dyn Sequence>, SequenceError> {
+    let mut folder = Folder::new(source)?;
+    let wrong = |field: &str, found: String, expected: &str| {
+        Err(invalid(&folder.name(), None, field, found, expected))
+    };
+    if options.stride == 0 {
+        return wrong("stride", "0".into(), "at least 1");
+    }
+    if options.frames == Some(0) {
+        return wrong("number of frames", "0".into(), "at least 1");
+    }
+    if !(options.scale > 0.0 && options.scale <= 1.0) {
+        return wrong("scale", options.scale.to_string(), "a number in (0, 1]");
+    }
+    if let Some(units) = options.depth_scale.filter(|s| !(s.is_finite() && *s > 0.0)) {
+        return wrong("depth scale", units.to_string(), "units of depth per metre > 0");
+    }
+    let given = match options.camera {
+        None => None,
+        Some(GivenCamera { focal_centre, distortion }) => {
+            let given = Intrinsics::any_size("the camera given", focal_centre);
+            Some(checked("the camera given", Intrinsics { distortion, ..given })?)
+        }
+    };
+    let layout = Layout::detect(&mut folder, options.layout, given.is_some())?;
+    let mut all = entries::read(&folder, layout, given)?;
+    let mut warnings = std::mem::take(&mut all.warnings);
+    if let Some(units) = options.depth_scale {
+        all.depth_unit_m = 1.0 / units;
+    }
+    if options.axes == Axes::OpenGl {
+        for frame in &mut all.frames {
+            frame.truth = frame.truth.map(|pose| pose.with_flipped_camera());
+        }
+    }
+
+    let there = all.frames.len();
+    let wanted = options.frames.unwrap_or(usize::MAX);
+    let mut frames: Vec<Entry> =
+        all.frames.into_iter().skip(options.start).step_by(options.stride).take(wanted).collect();
+    let Some(first) = frames.first() else {
+        let found = options.start.to_string();
+        let expected = format!("less than {there}, the number of frames");
+        return Err(invalid(&folder.name(), None, "start", found, expected));
+    };
+    for frame in &frames {
+        for file in [&frame.color.file, &frame.depth.file] {
+            if !folder.has(file) {
+                let number = frame.number;
+                let reason = format!("no such file in {} (frame {number})", folder.name());
+                return Err(SequenceError::Read { file: file.clone(), reason });
+            }
+        }
+    }
+
+    let depth_size = first.depth.size(&folder, first.number, "depth image")?;
+    let color_size = first.color.size(&folder, first.number, "colour image")?;
+    let mut camera = all.intrinsics.camera(&first.depth.file, depth_size)?;
+    check_aspect(&first.color.file, first.number, color_size, depth_size)?;
+    if color_size != depth_size {
+        let ((w, h), (to_w, to_h)) = (color_size, depth_size);
+        warnings.push(format!("colour of {w}x{h} fitted to the {to_w}x{to_h} of depth"));
+    }
+
+    let color_to_depth = Resize::to_size(color_size, depth_size);
+    let rectifier = if all.intrinsics.distortion == [0.0; 5] {
+        None
+    } else {
+        let rectifier = Rectifier::new(&all.intrinsics.from, &camera, &all.intrinsics.distortion)?;
+        let flat = rectifier.camera();
+        warnings.push(format!(
+            "lens distortion taken out; {}x{} pixels of {}x{} are left",
+            flat.width, flat.height, camera.width, camera.height
+        ));
+        camera = flat;
+        Some(rectifier)
+    };
+    let resize = Resize::by_scale((camera.width, camera.height), options.scale);
+    let (width, height) = resize.size();
+    if options.scale < 1.0 && (width < MIN_SIDE || height < MIN_SIDE) {
+        let found = format!("{}, which leaves {width}x{height} pixels", options.scale);
+        let expected = format!("at least {MIN_SIDE}x{MIN_SIDE}");
+        return Err(invalid(&folder.name(), None, "scale", found, expected));
+    }
+    camera = resize.camera(&camera);
+
+    let classes_wanted = Wanted {
+        list: options.classes,
+        unlabelled: options.unlabelled_raw_id,
+        only_present: options.only_present_classes,
+    };
+    let labels = match options.labels {
+        LabelSource::None => None,
+        LabelSource::Dataset => {
+            Labels::open(&folder, None, &mut frames, depth_size, classes_wanted)?
+        }
+        LabelSource::Folder(source) => {
+            let own = Some(Folder::new(source)?);
+            Labels::open(&folder, own, &mut frames, depth_size, classes_wanted)?
+        }
+    };
+    let bare = frames.iter().filter(|f| f.label.is_none()).count();
+    if labels.is_some() && bare > 0 {
+        warnings.push(format!("{} without a label image", plural(bare, "frame")));
+    }
+
+    let features = match options.features {
+        Some(source) => Some(Features::open(Folder::new(source)?, &frames)?),
+        None => None,
+    };
+    if features.is_some() && rectifier.is_some() {
+        warnings.push("feature maps are taken as they are, with lens distortion".into());
+    }
+
+    let name = folder.name();
+    let last = name.trim_end_matches(['/', '\\']).rsplit(['/', '\\']).next().unwrap_or_default();
+    let last = last.strip_suffix(".sens").unwrap_or(last);
+    let info = SequenceInfo {
+        name: last.into(),
+        layout: layout.name(),
+        camera,
+        depth_unit_m: all.depth_unit_m,
+        frames: frames.len(),
+        feature_channels: features.as_ref().map_or(0, |f| f.channels),
+        classes: labels.as_ref().map_or_else(ClassTable::default, |l| l.table.clone()),
+        bounds: all.bounds,
+    };
+    Ok(Box::new(Reader {
+        folder,
+        info,
+        frames,
+        depth_size,
+        color_size,
+        invalid_depth: all.invalid_depth,
+        color_to_depth,
+        rectifier,
+        resize,
+        labels,
+        features,
+        warnings,
+    }))
+}
+
+/// Colour is stretched to the size of depth, which is right only when both show the same.
+fn check_aspect(file: &str, frame: u64, color: Size, depth: Size) -> Result<(), SequenceError> {
+    if !same_aspect(color, depth) {
+        return Err(invalid(
+            file,
+            Some(frame),
+            "colour image size",
+            format!("{}x{}", color.0, color.1),
+            format!("the proportions of the depth image, {}x{}", depth.0, depth.1),
+        ));
+    }
+    Ok(())
+}
+
+struct Reader {
+    folder: Folder,
+    info: SequenceInfo,
+    frames: Vec<Entry>,
+    depth_size: Size,
+    color_size: Size,
+    invalid_depth: Option<u16>,
+    color_to_depth: Resize,
+    rectifier: Option<Rectifier>,
+    resize: Resize,
+    labels: Option<Labels>,
+    features: Option<Features>,
+    warnings: Vec<String>,
+}
+
+impl Reader {
+    /// Depth or labels, from the size on disk to the size of the camera.
+    fn fit_nearest<T: Copy>(&self, mut image: Vec<T>) -> Vec<T> {
+        if let Some(rectifier) = &self.rectifier {
+            image = rectifier.nearest(&image);
+        }
+        if self.resize.is_identity() { image } else { self.resize.nearest(&image) }
+    }
+
+    fn fit_color(&self, mut image: Vec<[u8; 3]>) -> Vec<[u8; 3]> {
+        if !self.color_to_depth.is_identity() {
+            image = self.color_to_depth.average(&image);
+        }
+        if let Some(rectifier) = &self.rectifier {
+            image = rectifier.bilinear(&image);
+        }
+        if self.resize.is_identity() { image } else { self.resize.average(&image) }
+    }
+}
+
+impl Sequence for Reader {
+    fn info(&self) -> &SequenceInfo {
+        &self.info
+    }
+
+    fn frame(&mut self, index: usize) -> Result<Frame, SequenceError> {
+        let entry = self
+            .frames
+            .get(index)
+            .ok_or(SequenceError::OutOfRange { index, frames: self.frames.len() })?
+            .clone();
+        let frame = entry.number;
+        let color = self.fit_color(entry.color.color(&self.folder, frame, self.color_size)?);
+        let mut depth = entry.depth.depth(&self.folder, frame, self.depth_size)?;
+        if let Some(marker) = self.invalid_depth {
+            for d in depth.iter_mut().filter(|d| **d == marker) {
+                *d = 0;
+            }
+        }
+        let depth = self.fit_nearest(depth);
+
+        let labels = self.labels(index)?;
+        let features = self.features.as_ref().map(|f| f.read(frame)).transpose()?;
+        let (number, time_s, truth) = (entry.number, entry.time_s, entry.truth);
+        Ok(Frame { index, number, time_s, color, depth, labels, truth, features })
+    }
+
+    fn labels(&mut self, index: usize) -> Result<Option<Vec<u8>>, SequenceError> {
+        let frames = self.frames.len();
+        let entry = self.frames.get(index).ok_or(SequenceError::OutOfRange { index, frames })?;
+        let (Some(labels), Some(file)) = (&mut self.labels, &entry.label) else {
+            return Ok(None);
+        };
+        let image = labels.read(&self.folder, file, entry.number, self.depth_size)?;
+        Ok(Some(self.fit_nearest(image)))
+    }
+
+    fn truth(&self, index: usize) -> Option<Pose> {
+        self.frames.get(index)?.truth
+    }
+
+    fn time_s(&self, index: usize) -> f64 {
+        self.frames.get(index).map_or(f64::NAN, |f| f.time_s)
+    }
+
+    fn number(&self, index: usize) -> u64 {
+        self.frames.get(index).map_or(index as u64, |f| f.number)
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let met = self.labels.as_ref().map(Labels::warnings).unwrap_or_default();
+        self.warnings.iter().cloned().chain(met).collect()
+    }
+}
