@@ -9,12 +9,12 @@ extern crate alloc;
 #[macro_use]
 pub mod call;
 pub mod config;
-pub mod device;
 pub mod engine;
 pub mod field;
 pub mod kernel;
 pub mod kernels;
 pub mod keyframe;
+pub mod map;
 pub mod recording;
 pub mod slam;
 pub mod track;

@@ -8,6 +8,7 @@ pub mod browser;
 pub mod cases;
 pub mod fixture;
 pub mod recorded;
+pub mod rig;
 pub mod samples;
 pub mod tokens;
 

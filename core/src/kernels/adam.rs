@@ -2,7 +2,7 @@
 pub use mte_slam_shaders::kernels::adam::AdamParams;
 
 use crate::kernel::{CpuDispatch, load_f32, load_i32, load_u32, or_u32, store_f32, store_u32};
-use crate::recording::{BufferId, Recording};
+use crate::{call::Call, recording::Recording};
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
@@ -20,11 +20,10 @@ kernel! { pub static ADAM = mte_slam_shaders::kernels::adam, twin }
 /// software adapter takes a quarter of the time that one parameter an invocation takes.
 const PARAMETERS_PER_INVOCATION: usize = 32;
 
-/// Records a step. `bindings` are those of [`ADAM`]. Any number of workgroups gives the same
-/// result; this one is quick.
-pub fn record(recording: &mut Recording, params: &AdamParams, bindings: &[BufferId]) {
+/// Records a step. Any number of workgroups gives the same result; this one is quick.
+pub fn record(recording: &mut Recording, params: &AdamParams, buffers: Buffers) {
     let invocations = (params.count as usize).div_ceil(PARAMETERS_PER_INVOCATION);
-    recording.dispatch_1d(&ADAM, params, bindings, invocations);
+    buffers.record(recording, params, invocations);
 }
 
 /// The bits of a NaN or an infinity.
