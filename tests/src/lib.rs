@@ -22,13 +22,18 @@ use mte_slam_core::{
 use pollster::block_on;
 
 /// A GPU engine, or None with a printed line where there is no adapter. With the environment
-/// variable `MTE_SLAM_REQUIRE_GPU=1` a missing adapter is a failure.
+/// variable `MTE_SLAM_REQUIRE_GPU=1` a missing adapter is a failure; `MTE_SLAM_NO_GPU=1` looks for
+/// none, for a quick look at the CPU engine alone.
 pub fn gpu_engine() -> Option<Engine> {
     gpu_engine_with(GpuOptions::default())
 }
 
 /// As [`gpu_engine`], with options.
 pub fn gpu_engine_with(options: GpuOptions) -> Option<Engine> {
+    if std::env::var("MTE_SLAM_NO_GPU").is_ok_and(|value| value == "1") {
+        println!("skipped: MTE_SLAM_NO_GPU=1");
+        return None;
+    }
     match block_on(Engine::gpu(options)) {
         Ok(engine) => Some(engine),
         Err(error) => {
@@ -257,3 +262,8 @@ impl TestRandom {
         low + (high - low) * (self.bits() >> 8) as f32 / (1 << 24) as f32
     }
 }
+
+/// The README's example must compile.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+pub struct Readme;

@@ -1,9 +1,10 @@
 //! `mte-slam serve` as a browser meets it: what is answered, and what is refused.
+use crate::program::*;
 use serde_json::Value;
 use std::{
     io::{BufRead, BufReader, Read, Write},
     net::TcpStream,
-    process::{Child, Command, Stdio},
+    process::{Child, Stdio},
     time::Duration,
 };
 
@@ -20,20 +21,13 @@ struct Serving {
 impl Serving {
     fn start() -> Serving {
         let folder = tempfile::tempdir().unwrap();
-        let program = env!("CARGO_BIN_EXE_mte-slam");
-        let room = folder.path().join("room");
-        let made = Command::new(program)
-            .args(["-q", "synth", "--frames", "5", "--width", "32"])
-            .arg(&room)
-            .status();
-        assert!(made.unwrap().success());
+        succeed(folder.path(), &["-q", "synth", "room", "--frames", "5", "--width", "32"]);
         let page = folder.path().join("page");
         std::fs::create_dir(&page).unwrap();
         std::fs::write(page.join("index.html"), "<html><head></head><body>page</body></html>")
             .unwrap();
-        let mut child = Command::new(program)
-            .args(["--json", "serve", "--port", "0", "--page"])
-            .args([&page, &room])
+        let serve = ["--json", "serve", "--port", "0", "--page", "page", "room"];
+        let mut child = command(folder.path(), &serve)
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
@@ -177,16 +171,6 @@ fn a_port_in_use_is_said() {
     let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let port = taken.local_addr().unwrap().port().to_string();
     let folder = tempfile::tempdir().unwrap();
-    let program = env!("CARGO_BIN_EXE_mte-slam");
-    let room = folder.path().join("room");
-    let made = Command::new(program)
-        .args(["-q", "synth", "--frames", "1", "--width", "32"])
-        .arg(&room)
-        .status();
-    assert!(made.unwrap().success());
-    let output =
-        Command::new(program).args(["serve", "--port", &port]).arg(&room).output().unwrap();
-    assert_eq!(output.status.code(), Some(1));
-    let text = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(text.contains(&format!("--port {port}")), "{text}");
+    succeed(folder.path(), &["-q", "synth", "room", "--frames", "1", "--width", "32"]);
+    refused(folder.path(), &["serve", "--port", &port, "room"], 1, &[&format!("--port {port}")]);
 }

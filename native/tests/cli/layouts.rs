@@ -1,5 +1,9 @@
 //! Recordings in every layout, written by a Python script that knows nothing of our code, read
 //! back to the same frames; and the commands about recordings on them.
+use crate::{
+    program::{mte_slam, text},
+    python,
+};
 use mte_slam_dataset::{ClassList, MemorySource, OpenOptions};
 use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
 use mte_slam_types::{
@@ -39,21 +43,7 @@ fn fixtures() -> Option<&'static Fixtures> {
 }
 
 fn make() -> Option<Fixtures> {
-    // The first `python3` need not be the one that the system's packages belong to.
-    let named = std::env::var("MTE_SLAM_PYTHON").ok();
-    let candidates = named.iter().map(String::as_str).chain(["python3", "/usr/bin/python3"]);
-    let is_complete = |python: &&str| {
-        let tried = Command::new(python).args(["-c", "import numpy, PIL"]).output();
-        tried.is_ok_and(|o| o.status.success())
-    };
-    let Some(python) = candidates.into_iter().find(is_complete) else {
-        let needed = std::env::var("MTE_SLAM_REQUIRE_PYTHON").is_ok_and(|v| v == "1");
-        assert!(!needed, "Python 3 with numpy and Pillow is required here");
-        println!(
-            "skipped: no Python 3 with numpy and Pillow (apt install python3-numpy python3-pil)"
-        );
-        return None;
-    };
+    let python = python::with(&["numpy", "PIL"])?;
     let folder = tempfile::tempdir().unwrap();
     let options = SyntheticOptions { frames: FRAMES, width: 96, height: 72, ..Default::default() };
     let mut room = SyntheticSequence::new(options);
@@ -82,10 +72,6 @@ fn make() -> Option<Fixtures> {
     let done = Command::new(python).arg(script).args([&raw, &out]).output().unwrap();
     assert!(done.status.success(), "{}", text(&done.stderr));
     Some(Fixtures { folder, info, frames })
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
 }
 
 /// All files of a folder, and those of the folders above that scenes share.
@@ -263,19 +249,16 @@ fn occi_is_refused_by_name_and_raw_ids_need_no_table() {
     assert!(classes.len() > 5 && classes.iter().all(|c| c.raw_id % 97 == 3), "{classes:?}");
 }
 
-fn mte_slam(arguments: &[&str], path: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_mte-slam"))
-        .args(&arguments[..1])
-        .arg(path)
-        .args(&arguments[1..])
-        .output()
-        .unwrap()
+/// A command on one of the fixtures.
+fn on(path: &Path, arguments: &[&str]) -> Output {
+    let all = [&arguments[..1], &[path.to_str().unwrap()], &arguments[1..]].concat();
+    mte_slam(path.parent().unwrap(), &all)
 }
 
 fn inspected(path: &Path, extra: &[&str]) -> Value {
     let mut arguments = vec!["inspect", "--json", "--quiet"];
     arguments.extend(extra);
-    let output = mte_slam(&arguments, path);
+    let output = on(path, &arguments);
     assert!(output.status.success(), "{}: {}", path.display(), text(&output.stderr));
     serde_json::from_slice(&output.stdout).unwrap()
 }
@@ -314,9 +297,9 @@ fn inspect_knows_every_layout_and_finds_nothing_wrong() {
             assert_eq!(found["poses"]["gaps"], json!([{"first": NO_POSE, "last": NO_POSE}]));
         }
     }
-    let plain = mte_slam(&["inspect", "--quiet"], &f.path("tum"));
+    let plain = on(&f.path("tum"), &["inspect", "--quiet"]);
     assert!(plain.stdout.is_empty());
-    let plain = text(&mte_slam(&["inspect"], &f.path("scannet.zip")).stdout);
+    let plain = text(&on(&f.path("scannet.zip"), &["inspect"]).stdout);
     for part in ["layout   scannet", "24, numbers 0 to 23", "colour of 192x144", "no true pose"] {
         assert!(plain.contains(part), "{part}: {plain}");
     }
@@ -346,7 +329,7 @@ fn inspect_finds_each_mistake_by_evidence() {
             assert!(found[0].contains(part), "{name} {extra:?}: {part} not in {found:?}");
         }
     }
-    let strict = mte_slam(&["inspect", "--strict", "--quiet"], &f.path("lexical-poses"));
+    let strict = on(&f.path("lexical-poses"), &["inspect", "--strict", "--quiet"]);
     assert_eq!(strict.status.code(), Some(1), "{}", text(&strict.stderr));
     // The cure that it names is one.
     let cured = inspected(&f.path("nerfstudio-opencv"), &["--axes", "opengl", "--strict"]);
@@ -373,7 +356,7 @@ fn converted_recordings_hold_the_same_frames() {
         for (to, tolerance) in [("replica", 1e-9), ("tum", 1e-9), ("sens", 1e-5)] {
             let out = folder.path().join(format!("{name}-{to}"));
             let target = out.to_str().unwrap();
-            let done = mte_slam(&["convert", target, "--to", to, "--quiet"], &f.path(name));
+            let done = on(&f.path(name), &["convert", target, "--to", to, "--quiet"]);
             assert!(done.status.success(), "{name} {to}: {}", text(&done.stderr));
             let mut sequence =
                 mte_slam_dataset::open(Box::new(source(&out)), OpenOptions::default()).unwrap();
@@ -395,7 +378,7 @@ fn converted_recordings_hold_the_same_frames() {
             } else {
                 compare(&format!("{name} to {to}"), sequence.as_mut(), &kept);
             }
-            let again = mte_slam(&["convert", target, "--to", to], &f.path(name));
+            let again = on(&f.path(name), &["convert", target, "--to", to]);
             assert_eq!(again.status.code(), Some(1));
             assert!(text(&again.stderr).contains("empty folder"), "{}", text(&again.stderr));
         }

@@ -1,9 +1,10 @@
 //! Suites as people run them: results, nothing done twice, runs that are killed or fail, bad files.
+use crate::program::*;
 use serde_json::Value;
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::{Command, Output, Stdio},
+    process::{Output, Stdio},
     time::{Duration, Instant, SystemTime},
 };
 
@@ -41,46 +42,15 @@ const RUNS: [&str; 4] = [
     "office.fast.base.seed2",
 ];
 
-fn command(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mte-slam"));
-    command.args(arguments).current_dir(folder).stdin(Stdio::null()).env_remove("MTE_SLAM_DATA");
-    command
-}
-
-fn run(folder: &Path, arguments: &[&str]) -> Output {
-    command(folder, arguments).output().unwrap()
-}
-
 fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-fn succeed(folder: &Path, arguments: &[&str]) -> Output {
-    let output = run(folder, arguments);
-    assert!(output.status.success(), "{arguments:?}: {}", said(&output));
-    output
-}
-
-fn fail(folder: &Path, arguments: &[&str], code: i32, parts: &[&str]) -> String {
-    let output = run(folder, arguments);
-    let message = said(&output);
-    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {message}");
-    for part in parts {
-        assert!(message.contains(part), "{arguments:?}: no {part:?} in {message:?}");
-    }
-    assert!(!message.contains("panicked"), "{message}");
-    message
+    text(&output.stderr)
 }
 
 /// A folder with a suite in it.
-fn suite(text: &str) -> tempfile::TempDir {
+fn suite(content: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("suite.toml"), text).unwrap();
+    fs::write(folder.path().join("suite.toml"), content).unwrap();
     folder
-}
-
-fn json(path: &Path) -> Value {
-    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
 }
 
 /// Every file of a folder with the time it was written at.
@@ -193,7 +163,7 @@ fn a_suite_measures_reports_and_does_nothing_twice() {
     fs::write(folder.join("other.toml"), SUITE.replace("render_every = 3", "render_every = 2"))
         .unwrap();
     let parts = ["run.toml", "render_every: found 3, expected 2", "--out"];
-    fail(folder, &["evaluate", "other.toml", "--out", "out"], 1, &parts);
+    refused(folder, &["evaluate", "other.toml", "--out", "out"], 1, &parts);
     assert_eq!(times(&out), before);
 
     // A report of what is there, without one of the runs.
@@ -244,7 +214,7 @@ fn kill_in_the_middle(folder: &Path) {
     let ended = || folder.join("out/report.html").exists();
     wait_for("a checkpoint", || saved.is_file() || ended());
     // Meanwhile nobody else may work there.
-    fail(folder, &arguments, 1, &["another start of a suite at work"]);
+    refused(folder, &arguments, 1, &["another start of a suite at work"]);
     parent.kill().unwrap();
     parent.wait().unwrap();
 }
@@ -295,7 +265,7 @@ fn a_failed_run_is_reported_and_the_others_are_done() {
     let arguments = ["evaluate", "suite.toml", "--out", "out"];
     let name = "office.fast.base.seed1";
     let parts = ["1 of 2 runs failed", name, "depth000002.png"];
-    fail(folder, &arguments, 1, &parts);
+    refused(folder, &arguments, 1, &parts);
     let out = folder.join("out");
     let results = json(&out.join("results.json"));
     let states: Vec<&str> =
@@ -323,7 +293,7 @@ fn bad_suites_say_what_is_wrong() {
         let folder = suite(&text);
         let mut all = vec!["suite.toml"];
         all.extend(parts);
-        fail(folder.path(), &["evaluate", "suite.toml", "--out", "out"], 2, &all);
+        refused(folder.path(), &["evaluate", "suite.toml", "--out", "out"], 2, &all);
         assert!(!folder.path().join("out").exists(), "nothing is begun");
     };
     bad("title", "titel", &["`titel`", "`title`", "line 2"]);
@@ -339,12 +309,12 @@ fn bad_suites_say_what_is_wrong() {
         &["found no nowhere/room below .", "the suite's folder", "--data"],
     );
     let folder = suite(SUITE);
-    fail(folder.path(), &["evaluate", "none.toml"], 2, &["none.toml", "built-in, recordings"]);
+    refused(folder.path(), &["evaluate", "none.toml"], 2, &["none.toml", "built-in, recordings"]);
     let parts = ["found no finished run"];
-    fail(folder.path(), &["evaluate", "suite.toml", "--report-only", "--out", "out"], 2, &parts);
+    refused(folder.path(), &["evaluate", "suite.toml", "--report-only", "--out", "out"], 2, &parts);
     fs::create_dir(folder.path().join("mine")).unwrap();
     fs::write(folder.path().join("mine/thesis.tex"), "x").unwrap();
-    fail(folder.path(), &["evaluate", "suite.toml", "--out", "mine"], 1, &["thesis.tex"]);
+    refused(folder.path(), &["evaluate", "suite.toml", "--out", "mine"], 1, &["thesis.tex"]);
 }
 
 #[test]
@@ -357,7 +327,7 @@ fn suites_with_data_fail_early_with_the_way_to_get_it() {
         "below data (by --data)",
         "download_replica.sh",
     ];
-    fail(folder, &["evaluate", "replica", "--data", "data", "--out", "out"], 2, &parts);
+    refused(folder, &["evaluate", "replica", "--data", "data", "--out", "out"], 2, &parts);
     let output = command(folder, &["evaluate", "scannet", "--out", "out"])
         .env("MTE_SLAM_DATA", "elsewhere")
         .output()
@@ -369,7 +339,7 @@ fn suites_with_data_fail_early_with_the_way_to_get_it() {
     }
     assert!(!folder.join("out").exists());
     // The plan is shown all the same: 8 scenes of 5 seeds.
-    let output = run(folder, &["evaluate", "replica", "--dry-run", "--json"]);
+    let output = mte_slam(folder, &["evaluate", "replica", "--dry-run", "--json"]);
     let plan: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(plan["runs"].as_array().unwrap().len(), 40);
     assert_eq!(output.status.code(), Some(2));
@@ -382,8 +352,8 @@ fn a_run_from_a_file_is_one_command() {
     succeed(folder, &["evaluate", "suite.toml", "--out", "out", "--prepare"]);
     let file = "out/runs/office.fast.base.seed2/run.toml";
     assert!(folder.join(file).is_file() && !folder.join("out/report.html").exists());
-    fail(folder, &["run", "--from", file, "--seed", "3"], 2, &["found other arguments"]);
-    fail(folder, &["run", "--from", "none.toml"], 2, &["none.toml", "cannot be read"]);
+    refused(folder, &["run", "--from", file, "--seed", "3"], 2, &["found other arguments"]);
+    refused(folder, &["run", "--from", "none.toml"], 2, &["none.toml", "cannot be read"]);
     succeed(folder, &["run", "--from", file]);
     let metrics = json(&folder.join(file).with_file_name("metrics.json"));
     assert_eq!(metrics["configuration"]["seed"], 2);
@@ -392,7 +362,12 @@ fn a_run_from_a_file_is_one_command() {
     assert!(said(&again).contains("finished before, nothing to do"));
     let text = fs::read_to_string(folder.join(file)).unwrap();
     fs::write(folder.join("bad.toml"), text + "speed = 3\n").unwrap();
-    fail(folder, &["run", "--from", "bad.toml"], 2, &["bad.toml", "`speed`", "expected an option"]);
+    refused(
+        folder,
+        &["run", "--from", "bad.toml"],
+        2,
+        &["bad.toml", "`speed`", "expected an option"],
+    );
     // A suite finds the run that was made in this way.
     let plan = succeed(folder, &["evaluate", "suite.toml", "--out", "out", "--dry-run"]);
     let text = String::from_utf8_lossy(&plan.stdout).into_owned();

@@ -1,33 +1,10 @@
 //! The evaluation protocols as people run them: `eval` on the files of a run, with true meshes whose
 //! figures are known.
+use crate::program::{TINY, json, json_of, mte_slam, succeed, text};
 use mte_slam_mesh::{read_ply, write_ply};
 use serde_json::Value;
-use std::{
-    fs,
-    path::Path,
-    process::{Command, Output},
-    sync::OnceLock,
-};
+use std::{fs, path::Path, sync::OnceLock};
 use tempfile::TempDir;
-
-fn mte_slam(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_mte-slam"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .expect("the program starts")
-}
-
-fn succeed(folder: &Path, arguments: &[&str]) -> String {
-    let output = mte_slam(folder, arguments);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{arguments:?}: {message}");
-    String::from_utf8(output.stdout).unwrap()
-}
-
-fn json(folder: &Path, arguments: &[&str]) -> Value {
-    serde_json::from_str(&succeed(folder, arguments)).unwrap()
-}
 
 /// A written sequence with views from other poses, and a small run on it.
 fn shared() -> &'static Path {
@@ -37,22 +14,7 @@ fn shared() -> &'static Path {
             let folder = tempfile::tempdir().unwrap();
             let at = folder.path();
             succeed(at, &["synth", "room", "--frames", "6", "--width", "64", "--novel", "3"]);
-            let mut run = vec!["run", "room", "--out", "run", "--preset", "fast", "-q"];
-            run.extend(["--engine", "cpu", "--mesh-resolution", "0.1", "--mesh-views", "20"]);
-            run.extend(["--render-every", "4"]);
-            for set in [
-                "mapping.rays=400",
-                "mapping.iterations=4",
-                "mapping.first_iterations=60",
-                "mapping.final_iterations=2",
-                "mapping.semantic_iterations=20",
-                "mapping.every=2",
-                "sampling.render_stratified=24",
-                "field.surface_fine_m=0.06",
-                "mesh.min_component_triangles=1",
-            ] {
-                run.extend(["--set", set]);
-            }
+            let run = [&["run", "room", "--out", "run", "-q"][..], &TINY].concat();
             succeed(at, &run);
             folder
         })
@@ -76,8 +38,7 @@ fn number(json: &Value, path: &[&str]) -> f64 {
 
 #[test]
 fn a_run_has_every_figure_with_its_protocol() {
-    let text = fs::read_to_string(shared().join("run/metrics.json")).unwrap();
-    let json: Value = serde_json::from_str(&text).unwrap();
+    let json = json(&shared().join("run/metrics.json"));
     for (section, word) in [
         ("trajectory", "SE(3)"),
         ("depth", "views"),
@@ -107,7 +68,7 @@ fn the_true_mesh_against_itself_and_moved() {
     with_mesh("same", &truth);
     let mut arguments = vec!["eval", "same", "room", "--json", "--mesh-views", "50"];
     arguments.extend(["--cull", "coslam,eslam,frustum"]);
-    let same = json(shared(), &arguments);
+    let same = json_of(shared(), &arguments);
     for section in ["mesh", "mesh_coslam", "mesh_frustum"] {
         assert!(number(&same, &[section, "point_to_surface", "accuracy_cm"]) < 1e-3, "{section}");
         assert_eq!(
@@ -129,13 +90,13 @@ fn the_true_mesh_against_itself_and_moved() {
     mesh.positions.iter_mut().for_each(|p| p[0] += 0.03);
     with_mesh("moved", &write_ply(&mesh).unwrap());
     let arguments = ["eval", "moved", "room", "--json", "--cull", "frustum", "--mesh-views", "0"];
-    let moved = json(shared(), &arguments);
+    let moved = json_of(shared(), &arguments);
     let accuracy = number(&moved, &["mesh_frustum", "point_to_surface", "accuracy_cm"]);
     assert!((0.2..3.0).contains(&accuracy), "{accuracy}");
     assert!(moved.get("mesh").is_none() && moved.get("mesh_coslam").is_none());
     let mut again = arguments.to_vec();
     again.push("--icp");
-    let aligned = json(shared(), &again);
+    let aligned = json_of(shared(), &again);
     let after = number(&aligned, &["mesh_frustum", "point_to_surface", "accuracy_cm"]);
     assert!(after < 0.3 * accuracy, "{after} after ICP, {accuracy} before");
     let protocol = aligned["mesh_frustum"]["protocol"].as_str().unwrap().to_owned();
@@ -148,9 +109,9 @@ fn views_are_written_down_and_follow_the_seed() {
         let file = format!("{name}.json");
         let mut arguments = vec!["eval", "run", "room", "--json", "--write-views", &file];
         arguments.extend(["--eval-seed", seed, "--cull", "coslam", "--mesh-views", "20"]);
-        let figures = json(shared(), &arguments);
+        let figures = json_of(shared(), &arguments);
         assert_eq!(figures["mesh_coslam"]["seed"].to_string(), seed);
-        serde_json::from_str(&fs::read_to_string(shared().join(&file)).unwrap()).unwrap()
+        json(&shared().join(&file))
     };
     let (a, b, c) = (view("a", "3"), view("b", "3"), view("c", "4"));
     assert_eq!(a, b);
@@ -165,13 +126,13 @@ fn views_are_written_down_and_follow_the_seed() {
 #[test]
 fn the_peers_class_protocol_and_novel_views_need_the_map() {
     let arguments = ["eval", "run", "room", "--json", "--mesh-views", "0", "--engine", "cpu"];
-    let plain = json(shared(), &arguments);
+    let plain = json_of(shared(), &arguments);
     // DATASET/novel is there, and so is the checkpoint.
     assert_eq!(plain["novel_views"]["views"], 3);
     assert!(plain.get("semantics_sni").is_none());
     let mut sni = arguments.to_vec();
     sni.extend(["--miou-protocol", "sni", "--novel", "room"]);
-    let sni = json(shared(), &sni);
+    let sni = json_of(shared(), &sni);
     assert_eq!(sni["semantics_sni"]["frame"], 0);
     assert!(number(&sni, &["semantics_sni", "miou_percent"]) > 0.0);
     assert!(number(&sni, &["semantics_sni", "pixel_accuracy_percent"]) <= 100.0);
@@ -181,7 +142,7 @@ fn the_peers_class_protocol_and_novel_views_need_the_map() {
     let by = |inference: &str| {
         let mut arguments = arguments.to_vec();
         arguments.extend(["--inference", inference]);
-        let mut again = json(shared(), &arguments)["semantics_by_inference"].take();
+        let mut again = json_of(shared(), &arguments)["semantics_by_inference"].take();
         let said = again.as_object_mut().unwrap().remove("inference");
         assert_eq!(said.unwrap(), inference);
         again
@@ -193,7 +154,7 @@ fn the_peers_class_protocol_and_novel_views_need_the_map() {
     assert!((accuracy(&anchors) - accuracy(&plain["semantics"])).abs() < 5.0, "{anchors:#}");
     // Without a checkpoint only what was asked for by name is an error.
     with_mesh("bare", &fs::read(shared().join("run/mesh.ply")).unwrap());
-    let bare = json(shared(), &["eval", "bare", "room", "--json", "--mesh-views", "0"]);
+    let bare = json_of(shared(), &["eval", "bare", "room", "--json", "--mesh-views", "0"]);
     assert!(bare.get("novel_views").is_none());
     let failed = mte_slam(shared(), &["eval", "bare", "room", "--miou-protocol", "sni"]);
     assert_eq!(failed.status.code(), Some(1));
@@ -202,7 +163,7 @@ fn the_peers_class_protocol_and_novel_views_need_the_map() {
 
 #[test]
 fn help_names_every_protocol() {
-    let help = succeed(shared(), &["eval", "--help"]);
+    let help = text(&succeed(shared(), &["eval", "--help"]).stdout);
     for word in [
         "mesh_coslam",
         "mesh_frustum",

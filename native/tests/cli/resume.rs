@@ -1,5 +1,6 @@
 //! Runs that are killed at any moment, and gone on with, end with the same files. The length:
-//! `MTE_SLAM_KILLS=20 cargo test -p mte-slam --test resume -- --nocapture` prints what happened.
+//! `MTE_SLAM_KILLS=20 cargo test -p mte-slam --test cli -- resume --nocapture` prints what happened.
+use crate::{program::*, python};
 use serde_json::Value;
 use std::{
     collections::BTreeMap,
@@ -9,67 +10,18 @@ use std::{
     time::{Duration, Instant},
 };
 
-const RUN: [&str; 27] = [
-    "run",
-    "room",
-    "-q",
-    "--engine",
-    "cpu",
-    "--preset",
-    "fast",
-    "--set",
-    "mapping.rays=400",
-    "--set",
-    "mapping.iterations=4",
-    "--set",
-    "mapping.first_iterations=60",
-    "--set",
-    "mapping.final_iterations=40",
-    "--set",
-    "mapping.semantic_iterations=200",
-    "--set",
-    "mapping.every=2",
-    "--set",
-    "mesh.min_component_triangles=1",
-    "--mesh-resolution",
-    "0.1",
-    "--mesh-views",
-    "20",
-    "--render-every",
-    "5",
-];
-
-fn command(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mte-slam"));
-    command.args(arguments).current_dir(folder).stdin(Stdio::null());
-    command
-}
-
+/// [`TINY`], long enough at its end to be killed there.
 fn start(out: &str, every: &str, extra: &[&str]) -> Vec<String> {
-    let rest = ["--set", "field.surface_fine_m=0.06", "--checkpoint-every", every, "--out", out];
-    RUN.iter().chain(&rest).chain(extra).map(|a| (*a).to_owned()).collect()
+    let longer =
+        ["--set", "mapping.final_iterations=40", "--set", "mapping.semantic_iterations=200"];
+    let rest = ["--checkpoint-every", every, "--out", out];
+    let all = ["run", "room", "-q"].iter().chain(&TINY).chain(&longer).chain(&rest).chain(extra);
+    all.map(|a| (*a).to_owned()).collect()
 }
 
-fn succeed(folder: &Path, arguments: &[String]) -> String {
-    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    let output = command(folder, &arguments).output().unwrap();
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{arguments:?}: {message}");
-    message
-}
-
-fn refused(folder: &Path, arguments: &[String], code: i32, parts: &[&str]) {
-    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    let output = command(folder, &arguments).output().unwrap();
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(code), "{message}");
-    assert!(parts.iter().all(|p| message.contains(p)), "{parts:?} in {message}");
-}
-
-/// Start it, and kill it after so long. Whether it had not ended by itself.
+/// Starts the program and kills it after a time. Whether it had not ended by itself.
 fn kill(folder: &Path, arguments: &[String], after: Duration) -> bool {
-    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    let mut child = command(folder, &arguments).stderr(Stdio::null()).spawn().unwrap();
+    let mut child = command(folder, arguments).stderr(Stdio::null()).spawn().unwrap();
     std::thread::sleep(after);
     let running = child.try_wait().unwrap().is_none();
     // SIGKILL on Unix, TerminateProcess on Windows: nothing of ours runs after it.
@@ -120,8 +72,7 @@ fn same(a: &BTreeMap<String, Vec<u8>>, b: &BTreeMap<String, Vec<u8>>) {
 
 fn recording() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let synth = ["synth", "room", "--frames", "10", "--width", "64"].map(str::to_owned);
-    succeed(folder.path(), &synth);
+    succeed(folder.path(), &["synth", "room", "--frames", "10", "--width", "64"]);
     folder
 }
 
@@ -168,7 +119,7 @@ fn killed_at_random_moments_it_ends_with_the_same_files() {
         let left = folder.join(&out).join(".resume/command.json");
         if left.is_file() {
             // In few words: all else is noted there.
-            succeed(folder, &["run", "-q", "--resume", &out].map(str::to_owned));
+            succeed(folder, &["run", "-q", "--resume", &out]);
         } else {
             succeed(folder, &again);
         }
@@ -180,18 +131,22 @@ fn killed_at_random_moments_it_ends_with_the_same_files() {
     );
 }
 
-/// The example for Python shows the run's path, where Python has what it needs.
+/// The format that a checkpoint says it has, such as `mte-slam-6`.
+fn format_of(checkpoint: &[u8]) -> String {
+    let (_, metadata) = safetensors::SafeTensors::read_metadata(checkpoint).unwrap();
+    metadata.metadata().as_ref().unwrap()["format"].clone()
+}
+
+/// The example for Python reads the format of today and shows the run's path.
 fn python_reads(out: &Path) {
     let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/read_checkpoint.py");
-    let python = std::env::var("MTE_SLAM_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let there = Command::new(&python).args(["-c", "import numpy, safetensors"]).output();
-    if !there.is_ok_and(|o| o.status.success()) {
-        println!("skipped: {python} has no numpy or safetensors");
-        return;
-    }
-    let path = out.with_extension("path.txt");
     let checkpoint = out.join("checkpoint.safetensors");
-    let output = Command::new(&python).arg(example).arg(checkpoint).arg(&path).output().unwrap();
+    let expected = format!("FORMAT = \"{}\"\n", format_of(&fs::read(&checkpoint).unwrap()));
+    let script = fs::read_to_string(&example).unwrap();
+    assert!(script.contains(&expected), "{} needs {expected}", example.display());
+    let Some(python) = python::with(&["numpy", "safetensors"]) else { return };
+    let path = out.with_extension("path.txt");
+    let output = Command::new(python).arg(example).arg(checkpoint).arg(&path).output().unwrap();
     let shown = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(shown.contains("10 frames, 0 lost") && shown.contains("planes.semantic"), "{shown}");
@@ -210,9 +165,7 @@ fn python_reads(out: &Path) {
 /// Leaves an interrupted run in `out`: one that was stopped after its first frame that is saved.
 fn interrupted(folder: &Path, out: &str) {
     let saved = folder.join(out).join(".resume/checkpoint.safetensors");
-    let arguments = start(out, "2", &[]);
-    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    let mut child = command(folder, &arguments).spawn().unwrap();
+    let mut child = command(folder, &start(out, "2", &[])).spawn().unwrap();
     let begin = Instant::now();
     while !saved.is_file() {
         assert!(begin.elapsed() < Duration::from_secs(120), "no checkpoint");
@@ -228,9 +181,9 @@ fn what_does_not_fit_is_refused() {
     let folder = recording();
     let folder = folder.path();
     let resume = |extra: &[&str]| start("out", "2", &[&["--resume"][..], extra].concat());
-    let short = ["run", "--resume", "out"].map(str::to_owned);
+    let short = ["run", "--resume", "out"];
     refused(folder, &short, 2, &["no interrupted run", "out"]);
-    refused(folder, &["run", "--resume", "--out", "x"].map(str::to_owned), 2, &["DATASET"]);
+    refused(folder, &["run", "--resume", "--out", "x"], 2, &["DATASET"]);
     interrupted(folder, "out");
 
     let other = resume(&["--set", "mapping.rays=401"]);
@@ -243,7 +196,7 @@ fn what_does_not_fit_is_refused() {
     );
     // Another recording under the same name.
     fs::rename(folder.join("room"), folder.join("kept")).unwrap();
-    succeed(folder, &["synth", "room", "--frames", "10", "--width", "64"].map(str::to_owned));
+    succeed(folder, &["synth", "room", "--frames", "10", "--width", "64"]);
     let first = first_color(&folder.join("room"));
     let image = image::open(&first).unwrap().to_rgb8();
     let mut changed = image.clone();
@@ -265,8 +218,8 @@ fn what_does_not_fit_is_refused() {
     fs::write(&path, &flipped).unwrap();
     refused(folder, &short, 1, &["checksum", "damaged"]);
     let mut version = bytes.clone();
-    let at = find(&version, b"mte-slam-6");
-    version[at + 9] = b'9';
+    let at = find(&version, format_of(&bytes).as_bytes());
+    version[at] = b'M';
     fs::write(&path, &version).unwrap();
     refused(folder, &short, 1, &["checkpoint.safetensors"]);
 
