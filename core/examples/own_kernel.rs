@@ -7,8 +7,8 @@
 //! ```
 use mte_slam_core::{
     call::Call,
+    commands::{Buffer, Commands},
     engine::{Engine, EngineError},
-    recording::{Buffer, Recording},
 };
 use pollster::block_on;
 
@@ -93,11 +93,11 @@ fn points(engine: &mut Engine) -> Result<Vec<[f32; 4]>, EngineError> {
     let depths: Buffer<u32> = engine.create("depths", pixels as usize)?;
     let points: Buffer<[f32; 4]> = engine.create("points", 4 * pixels as usize)?;
     let params = back_project::BackProjectParams { width, pixels, focal: 16.0, depth_unit: 0.001 };
-    let mut recording = Recording::new();
-    recording.upload(depths, 0, &image);
+    let mut commands = Commands::new();
+    commands.upload(depths, 0, &image);
     // Buffers by name: `depths: points` would not compile.
-    back_project::Buffers { depths, points }.record(&mut recording, &params, pixels as usize);
-    engine.submit(&recording)?;
+    back_project::Buffers { depths, points }.record(&mut commands, &params, pixels as usize);
+    engine.submit(&commands)?;
     block_on(engine.read_as(points, 0, pixels as usize))
 }
 

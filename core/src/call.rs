@@ -1,7 +1,7 @@
 //! Typed calls of kernels: buffers by the names of bindings.
 use crate::{
+    commands::{Buffer, BufferId, Command, Commands, to_words, workgroups_1d},
     kernel::Kernel,
-    recording::{Buffer, BufferId, Command, Recording, to_words, workgroups_1d},
 };
 use alloc::vec::Vec;
 use mte_slam_shaders::interface::{BindingSet, Element, Role, Sink};
@@ -45,15 +45,15 @@ pub trait Call: BindingSet<Handles> {
 
     /// Records a call of at least `invocations` invocations, in whole workgroups spread over x and y
     /// (see [`workgroups_1d`]). The kernel must check its linear id against a count of its own.
-    fn record(self, recording: &mut Recording, params: &Self::Params, invocations: usize) {
+    fn record(self, commands: &mut Commands, params: &Self::Params, invocations: usize) {
         let workgroups = workgroups_1d(invocations, Self::INTERFACE.workgroup_size);
-        self.record_workgroups(recording, params, workgroups);
+        self.record_workgroups(commands, params, workgroups);
     }
 
     /// Records a call of `workgroups` workgroups; nothing when any count is 0.
     fn record_workgroups(
         self,
-        recording: &mut Recording,
+        commands: &mut Commands,
         params: &Self::Params,
         workgroups: [u32; 3],
     ) {
@@ -62,7 +62,7 @@ pub trait Call: BindingSet<Handles> {
         }
         let mut ids = Ids(Vec::with_capacity(Self::INTERFACE.bindings.len()));
         self.give(&mut ids);
-        recording.commands.push(Command::Dispatch {
+        commands.list.push(Command::Dispatch {
             kernel: Self::KERNEL,
             bindings: ids.0,
             params: to_words(core::slice::from_ref(params)),

@@ -8,6 +8,7 @@ extern crate alloc;
 
 #[macro_use]
 pub mod call;
+pub mod commands;
 pub mod config;
 pub mod engine;
 pub mod field;
@@ -15,7 +16,6 @@ pub mod kernel;
 pub mod kernels;
 pub mod keyframe;
 pub mod map;
-pub mod recording;
 pub mod slam;
 pub mod track;
 

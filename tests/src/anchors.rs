@@ -7,6 +7,7 @@ use crate::{
     tokens::random,
 };
 use mte_slam_core::{
+    commands::workgroups_1d,
     field::decoder_floats,
     kernel::Kernel,
     kernels::{
@@ -20,7 +21,6 @@ use mte_slam_core::{
         ANCHOR_FLOATS, FEATURE, HEAD_FLOATS, NO_ANCHOR, NO_DISTANCE, RAY_OUT_FLOATS,
         RAY_STATE_FLOATS, STATE_ANCHOR, STATE_FEATURE,
     },
-    recording::workgroups_1d,
 };
 use std::collections::BTreeSet;
 

@@ -4,6 +4,7 @@ use crate::{TestRandom, f32_words};
 use bytemuck::Zeroable;
 use glam::DVec3;
 use mte_slam_core::{
+    commands::{Command, Commands, workgroups_1d},
     config::FieldConfig,
     engine::{Engine, EngineError},
     field::{FieldShape, initial_decoders},
@@ -14,7 +15,6 @@ use mte_slam_core::{
     },
     layout::{BACKWARD_STRIP, FieldParams, RAY_OUT_FLOATS, RAY_STATE_FLOATS},
     map::pose_words,
-    recording::{Command, Recording, workgroups_1d},
     shaders::decoders::GEOMETRY,
 };
 use mte_slam_types::{
@@ -393,16 +393,16 @@ pub async fn run_words_async(
     buffers: &[Vec<u32>],
     workgroups: [u32; 3],
 ) -> Result<Vec<Vec<u32>>, EngineError> {
-    let mut recording = Recording::new();
+    let mut commands = Commands::new();
     let mut ids = Vec::new();
     for (binding, data) in kernel.interface.bindings.iter().zip(buffers) {
         let id = engine.create_buffer(binding.name, data.len())?;
-        recording.upload(id, 0, data);
+        commands.upload(id, 0, data);
         ids.push(id);
     }
     let (bindings, params) = (ids.clone(), params.to_vec());
-    recording.commands.push(Command::Dispatch { kernel, bindings, params, workgroups });
-    let mut outcome = engine.submit(&recording).map(|()| Vec::new());
+    commands.list.push(Command::Dispatch { kernel, bindings, params, workgroups });
+    let mut outcome = engine.submit(&commands).map(|()| Vec::new());
     for (id, data) in ids.iter().zip(buffers) {
         if let Ok(all) = &mut outcome {
             match engine.read(*id, 0, data.len()).await {

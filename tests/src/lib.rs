@@ -14,10 +14,10 @@ pub mod tokens;
 
 use bytemuck::Pod;
 use mte_slam_core::{
+    commands::Commands,
     engine::{Engine, EngineError, GpuOptions},
     kernel::Kernel,
     layout::NO_DISTANCE,
-    recording::Recording,
 };
 use pollster::block_on;
 
@@ -124,16 +124,16 @@ pub fn run_kernel<P: Pod>(
     buffers: &[Vec<u32>],
     workgroups: [u32; 3],
 ) -> Result<Vec<Vec<u32>>, EngineError> {
-    let mut recording = Recording::new();
+    let mut commands = Commands::new();
     let mut ids = Vec::new();
     for (i, words) in buffers.iter().enumerate() {
         let name = kernel.interface.bindings.get(i).map_or("surplus", |binding| binding.name);
         let id = engine.create_buffer(name, words.len())?;
-        recording.upload(id, 0, words);
+        commands.upload(id, 0, words);
         ids.push(id);
     }
-    recording.dispatch(kernel, params, &ids, workgroups);
-    let outcome = engine.submit(&recording).and_then(|()| {
+    commands.dispatch(kernel, params, &ids, workgroups);
+    let outcome = engine.submit(&commands).and_then(|()| {
         ids.iter()
             .zip(buffers)
             .map(|(id, words)| block_on(engine.read(*id, 0, words.len())))

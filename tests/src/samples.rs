@@ -6,6 +6,7 @@ use crate::{
     fixture::{CLASSES, Options, POISON, State, words},
 };
 use mte_slam_core::{
+    commands::workgroups_1d,
     engine::Engine,
     kernels::{
         composite::COMPOSITE,
@@ -18,7 +19,6 @@ use mte_slam_core::{
         shared::FLAG_DENSE,
     },
     layout::RAY_OUT_FLOATS,
-    recording::workgroups_1d,
 };
 
 pub(crate) fn cases(kernel: &str) -> Option<Vec<Case>> {

@@ -8,6 +8,7 @@ use crate::{
     fixture::{CLASSES, Options, POISON, State, words},
 };
 use mte_slam_core::{
+    commands::workgroups_1d,
     engine::Engine,
     kernel::Kernel,
     kernels::{
@@ -30,7 +31,6 @@ use mte_slam_core::{
         },
     },
     layout::TARGET_FLOATS,
-    recording::workgroups_1d,
 };
 
 /// Parameters of a grid, without a layer.

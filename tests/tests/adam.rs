@@ -1,8 +1,8 @@
 //! The Adam kernel: shader against twin, twin against a plain f64 computation.
 use mte_slam_core::{
+    commands::workgroups_1d,
     engine::Engine,
     kernels::adam::{ADAM, AdamParams, STATUS_NOT_FINITE, STATUS_SATURATED},
-    recording::workgroups_1d,
 };
 use mte_slam_tests::{
     Compare, Mismatch, TestRandom, Tolerance, compare_kernel, compare_outputs, f32_words,

@@ -1,8 +1,8 @@
 //! What both engines promise: order, zeroed buffers, large dispatches, typed errors.
 use mte_slam_core::{
+    commands::{BufferId, Commands, workgroups_1d},
     engine::{Engine, EngineError, GpuEngine, GpuOptions, MAX_BUFFER_BYTES, list_adapters},
     kernel::{CpuDispatch, Kernel, add_i32, load_u32, store_u32},
-    recording::{BufferId, Recording, workgroups_1d},
     shaders::{interface::Interface, shared_struct, structs::StructLayout},
 };
 use mte_slam_tests::{TestRandom, gpu_engine, gpu_engine_with};
@@ -126,18 +126,18 @@ fn commands_take_effect_in_order() {
         let copied = engine.create_buffer("copied", n).unwrap();
         let counter = engine.create_buffer("counter", 1).unwrap();
         let bound = [source, values, counter];
-        let mut recording = Recording::new();
-        recording.upload(values, 0, &[1u32, 2, 3, 4, 5, 6, 7, 8]);
-        recording.upload(source, 0, &[100u32]);
-        recording.dispatch_1d(&AFFINE, &times(2, n), &bound, n);
+        let mut commands = Commands::new();
+        commands.upload(values, 0, &[1u32, 2, 3, 4, 5, 6, 7, 8]);
+        commands.upload(source, 0, &[100u32]);
+        commands.dispatch_1d(&AFFINE, &times(2, n), &bound, n);
         // These must not overtake the dispatch.
-        recording.upload(source, 0, &[1000u32]);
-        recording.copy(values, 0, copied, 2, 4);
-        recording.clear(values, 0, 2);
-        recording.dispatch_1d(&AFFINE, &times(1, n), &bound, n);
-        recording.dispatch_1d(&AFFINE, &times(1, n), &bound, n);
-        recording.upload(values, 7, &[-1i32]);
-        engine.submit(&recording).unwrap();
+        commands.upload(source, 0, &[1000u32]);
+        commands.copy(values, 0, copied, 2, 4);
+        commands.clear(values, 0, 2);
+        commands.dispatch_1d(&AFFINE, &times(1, n), &bound, n);
+        commands.dispatch_1d(&AFFINE, &times(1, n), &bound, n);
+        commands.upload(values, 7, &[-1i32]);
+        engine.submit(&commands).unwrap();
         assert_eq!(read(engine, copied, 0, n), [0, 0, 102, 104, 106, 112, 0, 0]);
         let expected = [2000, 2000, 2106, (112 * 2 + 1000) * 2 + 1000, 2110, 2112, 2114, u32::MAX];
         assert_eq!(read(engine, values, 0, n), expected);
@@ -149,21 +149,21 @@ fn commands_take_effect_in_order() {
 }
 
 #[test]
-fn long_recordings_keep_their_order_and_parameters() {
+fn long_lists_keep_their_order_and_parameters() {
     on_both(|engine| {
         let source = engine.create_buffer("source", 1).unwrap();
         let values = engine.create_buffer("values", 4).unwrap();
         let counter = engine.create_buffer("counter", 1).unwrap();
-        let (mut recording, mut random) = (Recording::new(), TestRandom(3));
+        let (mut commands, mut random) = (Commands::new(), TestRandom(3));
         let mut expected = [0u32; 4];
         for i in 0..500u32 {
             let factors = [random.bits(), random.bits(), random.bits(), random.bits()];
             if i % 50 == 7 {
-                recording.upload(source, 0, &[i]);
+                commands.upload(source, 0, &[i]);
             }
             let added = if i < 7 { 0 } else { (i - 7) / 50 * 50 + 7 };
             let params = TestParams { factors, count: 4 };
-            recording.dispatch_1d(&AFFINE, &params, &[source, values, counter], 4);
+            commands.dispatch_1d(&AFFINE, &params, &[source, values, counter], 4);
             for (value, factor) in expected.iter_mut().zip(factors) {
                 *value = value.wrapping_mul(factor).wrapping_add(added);
             }
@@ -173,14 +173,14 @@ fn long_recordings_keep_their_order_and_parameters() {
             if runs == 2 {
                 engine
                     .submit(&{
-                        let mut clear = Recording::new();
+                        let mut clear = Commands::new();
                         clear.clear(values, 0, 4);
                         clear.clear(source, 0, 1);
                         clear
                     })
                     .unwrap();
             }
-            engine.submit(&recording).unwrap();
+            engine.submit(&commands).unwrap();
             assert_eq!(read(engine, values, 0, 4), expected);
             assert_eq!(read(engine, counter, 0, 1), [2000 * runs]);
         }
@@ -195,10 +195,10 @@ fn more_workgroups_than_one_dimension_holds() {
         let source = engine.create_buffer("source", 1).unwrap();
         let values = engine.create_buffer("values", n).unwrap();
         let counter = engine.create_buffer("counter", 1).unwrap();
-        let mut recording = Recording::new();
-        recording.upload(source, 0, &[3u32]);
-        recording.dispatch_1d(&AFFINE, &times(1, n), &[source, values, counter], n);
-        engine.submit(&recording).unwrap();
+        let mut commands = Commands::new();
+        commands.upload(source, 0, &[3u32]);
+        commands.dispatch_1d(&AFFINE, &times(1, n), &[source, values, counter], n);
+        engine.submit(&commands).unwrap();
         assert_eq!(read(engine, counter, 0, 1), [n as u32]);
         assert!(read(engine, values, 0, n).iter().all(|value| *value == 3));
     });
@@ -213,11 +213,11 @@ fn mistakes_are_refused_before_anything_runs() {
         let gone = engine.create_buffer("gone", 8).unwrap();
         engine.destroy_buffer(gone);
         let params = times(1, 8);
-        let mut refuse = |record: &dyn Fn(&mut Recording)| {
-            let mut recording = Recording::new();
-            recording.upload(a, 0, &[7u32]);
-            record(&mut recording);
-            let error = engine.submit(&recording).unwrap_err();
+        let mut refuse = |record: &dyn Fn(&mut Commands)| {
+            let mut commands = Commands::new();
+            commands.upload(a, 0, &[7u32]);
+            record(&mut commands);
+            let error = engine.submit(&commands).unwrap_err();
             assert_eq!(read(engine, a, 0, 1), [0], "{error} came too late");
             error
         };
@@ -247,11 +247,11 @@ fn mistakes_are_refused_before_anything_runs() {
         assert!(matches!(error, EngineError::OutOfRange { operation: "read", .. }));
         assert!(block_on(engine.read_as::<u64>(b, 0, usize::MAX)).is_err());
         // Nothing is recorded for no work, and the engine is still usable.
-        let mut recording = Recording::new();
-        recording.dispatch(&AFFINE, &params, &[a, b, c], [4, 0, 1]);
-        assert!(recording.commands.is_empty());
-        recording.upload(a, 0, &[7u32]);
-        engine.submit(&recording).unwrap();
+        let mut commands = Commands::new();
+        commands.dispatch(&AFFINE, &params, &[a, b, c], [4, 0, 1]);
+        assert!(commands.list.is_empty());
+        commands.upload(a, 0, &[7u32]);
+        engine.submit(&commands).unwrap();
         assert_eq!(read(engine, a, 0, 1), [7]);
     });
 }
@@ -273,13 +273,13 @@ fn too_large_buffers_are_refused_with_numbers() {
 #[test]
 fn broken_shaders_are_typed_errors_and_the_engine_survives() {
     let Some(mut engine) = gpu_engine() else { return };
-    let mut recording = Recording::new();
-    recording.dispatch(&BROKEN, &(), &[], [1, 1, 1]);
-    let error = engine.submit(&recording).unwrap_err();
+    let mut commands = Commands::new();
+    commands.dispatch(&BROKEN, &(), &[], [1, 1, 1]);
+    let error = engine.submit(&commands).unwrap_err();
     assert!(matches!(&error, EngineError::Validation { message } if message.contains("broken")));
-    let mut recording = Recording::new();
-    recording.dispatch(&UNKNOWN, &(), &[], [1, 1, 1]);
-    let error = engine.submit(&recording).unwrap_err();
+    let mut commands = Commands::new();
+    commands.dispatch(&UNKNOWN, &(), &[], [1, 1, 1]);
+    let error = engine.submit(&commands).unwrap_err();
     assert!(error.to_string().contains("unknown.wgsl line 1: unknown name NOPE"), "{error}");
     if let Engine::Gpu(engine) = &mut engine {
         let error = block_on(engine.precompile(&[&AFFINE, &BROKEN])).unwrap_err();
@@ -310,8 +310,8 @@ fn a_wrong_adapter_name_lists_the_adapters() {
 fn unknown_overrides_are_refused() {
     let options = GpuOptions { overrides: vec![("CHANELS", 8)], ..Default::default() };
     let Some(mut engine) = gpu_engine_with(options) else { return };
-    let mut recording = Recording::new();
-    recording.dispatch(&BROKEN, &(), &[], [1, 1, 1]);
-    let error = engine.submit(&recording).unwrap_err();
+    let mut commands = Commands::new();
+    commands.dispatch(&BROKEN, &(), &[], [1, 1, 1]);
+    let error = engine.submit(&commands).unwrap_err();
     assert!(error.to_string().contains("CHANELS"), "{error}");
 }

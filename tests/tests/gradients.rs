@@ -7,6 +7,7 @@
 //! derivatives along whole directions, where a kink is one term of many, may not.
 use glam::DVec3;
 use mte_slam_core::{
+    commands::Commands,
     config::{Config, Head, LossConfig},
     engine::Engine,
     kernels::{
@@ -16,7 +17,6 @@ use mte_slam_core::{
     },
     layout::{HEAD_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_POSE},
     map::{Batch, ParameterTensor, Rates, SemanticSupervision},
-    recording::Recording,
     shaders::decoders::{COLOR, GEOMETRY, SEMANTIC},
 };
 use mte_slam_tests::{
@@ -86,7 +86,7 @@ impl Problem {
         let mut problem = Problem { rig, loss, flags, rays_per_frame: RAYS_PER_FRAME };
         let state = State::new(&Options::default());
         let d = &mut problem.rig;
-        let mut r = Recording::new();
+        let mut r = Commands::new();
         for (tensor, name) in [
             (d.geometry, "planes_geometry"),
             (d.appearance, "planes_appearance"),
@@ -124,7 +124,7 @@ impl Problem {
     fn loss(&mut self) -> f64 {
         let loss = self.loss.clone();
         let batch = self.batch(&loss);
-        let mut r = Recording::new();
+        let mut r = Commands::new();
         self.rig.record_forward(&mut r, &batch);
         self.rig.record_backward(&mut r, &batch);
         self.rig.submit(&r);
@@ -135,14 +135,14 @@ impl Problem {
 
     fn read(
         &mut self,
-        buffer: impl Into<mte_slam_core::recording::BufferId>,
+        buffer: impl Into<mte_slam_core::commands::BufferId>,
         floats: usize,
     ) -> Vec<f32> {
         self.rig.read(buffer, floats)
     }
 
     fn set(&mut self, tensor: ParameterTensor, values: &[f32]) {
-        let mut r = Recording::new();
+        let mut r = Commands::new();
         r.upload(tensor.values, 0, values);
         self.rig.submit(&r);
     }
@@ -151,7 +151,7 @@ impl Problem {
     fn gradients(&mut self) -> [Vec<f32>; 4] {
         let loss = self.loss.clone();
         let batch = self.batch(&loss);
-        let mut r = Recording::new();
+        let mut r = Commands::new();
         self.rig.record_forward(&mut r, &batch);
         self.rig.record_backward(&mut r, &batch);
         self.rig.record_pose_step(&mut r, &batch, [0.0, 0.0], true);
@@ -406,7 +406,7 @@ fn poses_of_the_window() {
 }
 
 fn place(problem: &mut Problem, slot: u32, pose: &Pose) {
-    let mut r = Recording::new();
+    let mut r = Commands::new();
     problem.rig.upload_pose(&mut r, slot, pose);
     problem.rig.submit(&r);
 }

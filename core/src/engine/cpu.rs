@@ -4,14 +4,14 @@ use super::{
     check::{Table, allocated_words, buffer_size},
 };
 use crate::{
+    commands::{BufferId, Command, Commands},
     kernel::{CpuBinding, CpuDispatch, Kernel},
-    recording::{BufferId, Command, Recording},
 };
 use alloc::{string::ToString, vec, vec::Vec};
 use core::sync::atomic::AtomicU32;
 use mte_slam_shaders::interface::Access;
 
-/// Runs recordings on the processor, in parallel over workgroups with the feature `threads`. It needs no adapter
+/// Runs commands on the processor, in parallel over workgroups with the feature `threads`. It needs no adapter
 /// and is the oracle of the kernels' tests.
 pub struct CpuEngine {
     buffers: Table<Vec<u32>>,
@@ -45,9 +45,9 @@ impl CpuEngine {
     }
 
     /// See [`Engine::submit`](super::Engine::submit).
-    pub fn submit(&mut self, recording: &Recording) -> Result<(), EngineError> {
-        self.buffers.check(recording)?;
-        for command in &recording.commands {
+    pub fn submit(&mut self, commands: &Commands) -> Result<(), EngineError> {
+        self.buffers.check(commands)?;
+        for command in &commands.list {
             self.run(command);
         }
         Ok(())

@@ -10,8 +10,8 @@ use super::{
     oneshot,
 };
 use crate::{
+    commands::{BufferId, Command, Commands},
     kernel::Kernel,
-    recording::{BufferId, Command, Recording},
 };
 use alloc::{collections::BTreeMap, format, string::String, sync::Arc, vec::Vec};
 use core::num::NonZeroU64;
@@ -48,7 +48,7 @@ struct Failures {
     lost: Option<String>,
 }
 
-/// Runs recordings on a graphics adapter with no more than WebGPU's default limits. Stays on the
+/// Runs commands on a graphics adapter with no more than WebGPU's default limits. Stays on the
 /// thread that made it on the web.
 pub struct GpuEngine {
     device: wgpu::Device,
@@ -163,16 +163,16 @@ impl GpuEngine {
     }
 
     /// See [`Engine::submit`](super::Engine::submit).
-    pub fn submit(&mut self, recording: &Recording) -> Result<(), EngineError> {
+    pub fn submit(&mut self, commands: &Commands) -> Result<(), EngineError> {
         self.check_failures()?;
-        self.buffers.check(recording)?;
-        for command in &recording.commands {
+        self.buffers.check(commands)?;
+        for command in &commands.list {
             if let Command::Dispatch { kernel, bindings, .. } = command {
                 self.compile(kernel)?;
                 self.bind(kernel, bindings)?;
             }
         }
-        self.encode(recording)?;
+        self.encode(commands)?;
         self.check_failures()
     }
 

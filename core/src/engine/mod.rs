@@ -1,4 +1,4 @@
-//! Engines that run recordings: the CPU engine (Rust twins) and the GPU engine (wgpu).
+//! Engines that run commands: the CPU engine (Rust twins) and the GPU engine (wgpu).
 mod check;
 mod cpu;
 #[cfg(feature = "gpu")]
@@ -10,7 +10,7 @@ pub use cpu::CpuEngine;
 #[cfg(feature = "gpu")]
 pub use gpu::{AdapterDescription, GpuEngine, GpuOptions, list_adapters};
 
-use crate::recording::{Buffer, BufferId, Recording};
+use crate::commands::{Buffer, BufferId, Commands};
 use alloc::{string::String, vec::Vec};
 use bytemuck::Pod;
 use mte_slam_shaders::shader::ShaderError;
@@ -192,7 +192,7 @@ pub struct EngineInfo {
     pub driver: String,
 }
 
-/// Runs recordings. Both kinds accept and refuse the same recordings.
+/// Runs commands. Both kinds accept and refuse the same ones.
 pub enum Engine {
     /// The kernels' Rust twins.
     Cpu(CpuEngine),
@@ -250,10 +250,10 @@ impl Engine {
         either!(self, engine => engine.destroy_buffer(buffer))
     }
 
-    /// Runs a recording, in order. A recording with a mistake is refused as a whole. On the GPU
+    /// Runs commands, in order. With a mistake in one of them all are refused. On the GPU
     /// this returns before the work is done, and failures of earlier work may be reported here.
-    pub fn submit(&mut self, recording: &Recording) -> Result<(), EngineError> {
-        either!(self, engine => engine.submit(recording))
+    pub fn submit(&mut self, commands: &Commands) -> Result<(), EngineError> {
+        either!(self, engine => engine.submit(commands))
     }
 
     /// Reads words back after all submitted work.

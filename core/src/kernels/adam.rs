@@ -2,7 +2,7 @@
 pub use mte_slam_shaders::kernels::adam::AdamParams;
 
 use crate::kernel::{CpuDispatch, load_f32, load_i32, load_u32, or_u32, store_f32, store_u32};
-use crate::{call::Call, recording::Recording};
+use crate::{call::Call, commands::Commands};
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
@@ -21,9 +21,9 @@ kernel! { pub static ADAM = mte_slam_shaders::kernels::adam, twin }
 const PARAMETERS_PER_INVOCATION: usize = 32;
 
 /// Records a step. Any number of workgroups gives the same result; this one is quick.
-pub fn record(recording: &mut Recording, params: &AdamParams, buffers: Buffers) {
+pub fn record(commands: &mut Commands, params: &AdamParams, buffers: Buffers) {
     let invocations = (params.count as usize).div_ceil(PARAMETERS_PER_INVOCATION);
-    buffers.record(recording, params, invocations);
+    buffers.record(commands, params, invocations);
 }
 
 /// The bits of a NaN or an infinity.

@@ -26,12 +26,12 @@ pub use suppressor::{AnchorCounts, Suppressor};
 
 use crate::{
     camera::Camera,
+    commands::{Buffer, Commands},
     config::{Config, Head},
     engine::{Engine, EngineError},
     field::{FieldShape, decoder_floats, initial_decoders, initial_planes},
     frame::SequenceInfo,
     layout::FieldParams,
-    recording::{Buffer, Recording},
 };
 use alloc::{vec, vec::Vec};
 use mte_slam_shaders::random::salt;
@@ -150,7 +150,7 @@ impl Map {
             token_class_weights: e.create("token class weights", classes.max(4) as usize)?,
             no_anchors: e.create("no anchors", 4)?,
         };
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         r.upload(
             map.geometry.values,
             0,
@@ -198,7 +198,7 @@ impl Map {
     /// how rare they are; one value per class.
     pub fn upload_class_weights(
         &self,
-        r: &mut Recording,
+        r: &mut Commands,
         rays: &[ClassWeight],
         fusion: &[f32],
         rarity: &[f32],
@@ -248,7 +248,7 @@ impl Map {
                 let values: Vec<f32> = engine.read_as(from, 0, t.floats).await?;
                 let mut fresh = first;
                 shape.carry_over(&old, surface, &values, &mut fresh);
-                let mut r = Recording::default();
+                let mut r = Commands::default();
                 r.upload(to, 0, &fresh);
                 engine.submit(&r)?;
             }

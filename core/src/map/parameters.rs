@@ -1,8 +1,8 @@
 //! Parameter tensors, and Adam's steps on them.
 use crate::{
+    commands::{Buffer, Commands},
     engine::{Engine, EngineError},
     kernels::adam::{self, AdamParams},
-    recording::{Buffer, Recording},
 };
 use core::ops::Range;
 
@@ -44,7 +44,7 @@ impl ParameterTensor {
     }
 
     /// Records a step of Adam, which leaves parameters without gradient alone.
-    pub(super) fn record_adam(&self, r: &mut Recording, status: Buffer<u32>, step: AdamStep) {
+    pub(super) fn record_adam(&self, r: &mut Commands, status: Buffer<u32>, step: AdamStep) {
         let correction = |beta: f64| {
             let steps = step.number.min(1 << 20) as i32;
             (1.0 / (1.0 - num_traits::Float::powi(beta, steps))) as f32

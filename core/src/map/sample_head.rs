@@ -5,6 +5,7 @@
 use super::{Map, ParameterTensor, Rates, Scratch, parameters::AdamStep};
 use crate::{
     call::Call,
+    commands::{Buffer, Commands},
     engine::{Engine, EngineError},
     kernels::{
         matrix_product::{self, MatrixProductParams, NO_SUMS},
@@ -15,7 +16,6 @@ use crate::{
         shared::{FLAG_DENSE, RAY_WORDS, random_f32},
     },
     layout::{CHANNELS, FieldParams, RAY_OUT_FLOATS},
-    recording::{Buffer, Recording},
 };
 use alloc::{vec, vec::Vec};
 use core::ops::Range;
@@ -101,7 +101,7 @@ impl SampleHead {
                         * limit;
             }
         }
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         r.upload(head.parameters.values, 0, &w);
         e.submit(&r)?;
         Ok(head)
@@ -139,16 +139,16 @@ impl SampleScratch {
 }
 
 /// Classes (and, with labels, the loss) of the batch's rays.
-pub(super) fn record_classes(r: &mut Recording, map: &Map, scratch: &Scratch, p: &FieldParams) {
+pub(super) fn record_classes(r: &mut Commands, map: &Map, scratch: &Scratch, p: &FieldParams) {
     record_head(r, map, scratch, p, false);
 }
 
 /// Classes, loss and all gradients of the head and the semantic planes.
-pub(super) fn record_backward(r: &mut Recording, map: &Map, scratch: &Scratch, p: &FieldParams) {
+pub(super) fn record_backward(r: &mut Commands, map: &Map, scratch: &Scratch, p: &FieldParams) {
     record_head(r, map, scratch, p, true);
 }
 
-fn record_head(r: &mut Recording, map: &Map, scratch: &Scratch, p: &FieldParams, train: bool) {
+fn record_head(r: &mut Commands, map: &Map, scratch: &Scratch, p: &FieldParams, train: bool) {
     let (Some(h), Some(s)) = (&map.sample_head, &scratch.sample_head) else { return };
     let views = p.flags & FLAG_DENSE != 0;
     let slots = if views { p.samples.min(VIEW_SLOTS) } else { p.samples };
@@ -205,7 +205,7 @@ fn record_head(r: &mut Recording, map: &Map, scratch: &Scratch, p: &FieldParams,
 
 /// The part of the batch that the rays of a range are.
 fn record_part(
-    r: &mut Recording,
+    r: &mut Commands,
     map: &Map,
     scratch: &Scratch,
     p: &FieldParams,
@@ -337,7 +337,7 @@ fn record_part(
 }
 
 /// The head's part of step `number` of the map.
-pub(super) fn record_step(r: &mut Recording, map: &Map, rates: Rates, number: u32) {
+pub(super) fn record_step(r: &mut Commands, map: &Map, rates: Rates, number: u32) {
     let Some(h) = &map.sample_head else { return };
     let floats = 0..h.parameters.floats;
     let step = AdamStep { floats, quanta: None, rate: rates.decoders, number };
@@ -360,7 +360,7 @@ pub(super) async fn classes_at(
         }
         let n = chunk.len();
         let weights: Vec<f32> = (0..2 * n).map(|i| ((i + 1) % 2) as f32).collect();
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         r.upload(scratch.rays, 0, &rays);
         r.clear(scratch.depths, 0, 2 * n);
         r.upload(scratch.weights, 0, &weights);

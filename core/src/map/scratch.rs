@@ -1,12 +1,12 @@
 //! The buffers of one batch.
 use super::{FusionScratch, Map, SampleScratch};
 use crate::{
+    commands::{Buffer, Commands},
     config::Config,
     engine::{Engine, EngineError},
     field::decoder_floats,
     kernels::shared::{RAY_WORDS, Ray},
     layout::{GEOMETRY_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS},
-    recording::{Buffer, Recording},
 };
 use alloc::vec::Vec;
 
@@ -95,7 +95,7 @@ impl Scratch {
     }
 
     /// Sets the window: slots, and whether each pose is fixed.
-    pub fn upload_window(&self, r: &mut Recording, window: &[(u32, bool)]) {
+    pub fn upload_window(&self, r: &mut Commands, window: &[(u32, bool)]) {
         let words: Vec<u32> =
             window.iter().map(|(slot, fixed)| slot | (u32::from(*fixed) << 31)).collect();
         r.upload(self.window, 0, &words);

@@ -3,13 +3,13 @@ use super::{FrameFormat, Map};
 use crate::{
     camera::Camera,
     classes::UNLABELLED,
+    commands::{Buffer, Commands},
     config::{Config, FusionConfig},
     engine::{Engine, EngineError},
     frame::{FeatureMap, Frame},
     kernels::pose_step::POSE_STATE_FLOATS,
     layout::TARGET_FLOATS,
     pose::Pose,
-    recording::{Buffer, Recording},
 };
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
@@ -111,7 +111,7 @@ impl FrameSlots {
 
     /// Stores a frame's images in a slot, and forgets the pose optimiser's state of the slot's
     /// former frame.
-    pub fn upload_frame(&self, r: &mut Recording, slot: u32, frame: &Frame) {
+    pub fn upload_frame(&self, r: &mut Commands, slot: u32, frame: &Frame) {
         let pixels = self.camera.pixels();
         let color = color_words(frame);
         let depth: Vec<u32> = frame
@@ -127,7 +127,7 @@ impl FrameSlots {
         }
     }
 
-    fn upload_features(&self, r: &mut Recording, slot: u32, grid: &TokenGrid, map: &FeatureMap) {
+    fn upload_features(&self, r: &mut Commands, slot: u32, grid: &TokenGrid, map: &FeatureMap) {
         if map.channels != self.channels as usize {
             return;
         }
@@ -154,12 +154,12 @@ impl FrameSlots {
     }
 
     /// Replaces colour and label of a slot's pixels.
-    pub fn upload_color(&self, r: &mut Recording, slot: u32, image: &[[u8; 4]]) {
+    pub fn upload_color(&self, r: &mut Commands, slot: u32, image: &[[u8; 4]]) {
         r.upload(self.color_images, slot as usize * self.camera.pixels(), image);
     }
 
     /// Sets the pose of a slot.
-    pub fn upload_pose(&self, r: &mut Recording, slot: u32, pose: &Pose) {
+    pub fn upload_pose(&self, r: &mut Commands, slot: u32, pose: &Pose) {
         r.upload(self.poses, slot as usize * POSE_FLOATS, &pose_words(pose));
     }
 

@@ -2,9 +2,9 @@
 //! them, and the counters beside them.
 use super::{Map, ParameterTensor};
 use crate::{
+    commands::BufferId,
     kernels::pose_step::POSE_STATE_FLOATS,
     layout::{ANCHOR_FLOATS, CHANNELS},
-    recording::BufferId,
 };
 use alloc::{format, string::String, vec, vec::Vec};
 use serde::{Deserialize, Serialize};

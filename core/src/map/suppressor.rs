@@ -2,6 +2,7 @@
 use super::{Batch, Map, Scratch};
 use crate::{
     call::Call,
+    commands::{Buffer, Commands},
     config::{AnchorRule, SuppressorConfig},
     engine::{Engine, EngineError},
     kernels::{
@@ -11,7 +12,6 @@ use crate::{
         update_anchors::{self, UpdateAnchorsParams},
     },
     layout::{ANCHOR_FLOATS, NO_DISTANCE},
-    recording::{Buffer, Recording},
 };
 use alloc::{vec, vec::Vec};
 use serde::{Deserialize, Serialize};
@@ -63,7 +63,7 @@ impl Suppressor {
         for a in free.chunks_exact_mut(ANCHOR_FLOATS) {
             a[16] = 255;
         }
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         r.upload(s.anchors, 0, &free);
         e.submit(&r)?;
         Ok(s)
@@ -78,7 +78,7 @@ impl Suppressor {
 /// Moves the anchors to the features of the last forward pass.
 ///
 /// Records nothing without a suppressor.
-pub fn record_update(r: &mut Recording, map: &Map, scratch: &Scratch, b: &Batch<'_>) {
+pub fn record_update(r: &mut Commands, map: &Map, scratch: &Scratch, b: &Batch<'_>) {
     let Some(s) = &map.suppressor else { return };
     let c = &s.config;
     update_anchors::Buffers {
@@ -106,7 +106,7 @@ pub fn record_update(r: &mut Recording, map: &Map, scratch: &Scratch, b: &Batch<
 /// Drops, merges and spawns anchors from the features of the last forward pass.
 ///
 /// Records nothing without a suppressor.
-pub fn record_maintenance(r: &mut Recording, map: &Map, scratch: &Scratch, b: &Batch<'_>) {
+pub fn record_maintenance(r: &mut Commands, map: &Map, scratch: &Scratch, b: &Batch<'_>) {
     let Some(s) = &map.suppressor else { return };
     let c = &s.config;
     let square = |d: f64| (d * d) as f32;
@@ -143,7 +143,7 @@ pub fn record_maintenance(r: &mut Recording, map: &Map, scratch: &Scratch, b: &B
 ///
 /// Records nothing without a suppressor.
 pub fn record_settling(
-    r: &mut Recording,
+    r: &mut Commands,
     map: &Map,
     scratch: &Scratch,
     b: &Batch<'_>,
@@ -152,7 +152,7 @@ pub fn record_settling(
 ) {
     let Some(s) = &map.suppressor else { return };
     let (anchors, classes) = (s.config.anchors, map.classes);
-    let settle = |r: &mut Recording, rays| {
+    let settle = |r: &mut Commands, rays| {
         settle_anchors::Buffers {
             rays: scratch.rays,
             ray_state: scratch.ray_state,

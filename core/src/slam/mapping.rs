@@ -2,6 +2,7 @@
 use super::semantics::steps_due;
 use super::{Breathe, Losses, Observation, Slam, SlamError};
 use crate::{
+    commands::Commands,
     config::{RefinePoses, Tracker},
     engine::Engine,
     field::FieldShape,
@@ -13,7 +14,6 @@ use crate::{
         Batch, FrameFormat, Map, Rates, Scratch, SemanticSupervision, WINDOW_MAX, fusion, passes,
         suppressor,
     },
-    recording::Recording,
 };
 use alloc::{collections::BTreeSet, vec::Vec};
 use glam::DVec3;
@@ -107,7 +107,7 @@ impl Slam {
         };
         self.class_counts.add(self.info.classes.len(), frame);
         let (engine, map, _) = self.mapped()?;
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         map.frames.upload_frame(&mut r, slot, frame);
         engine.submit(&r)?;
 
@@ -245,7 +245,7 @@ impl Slam {
         let first_iteration = self.iteration;
         self.iteration += iterations;
         let (engine, map, scratch) = self.mapped()?;
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         for (slot, pose) in &keyframes {
             map.frames.upload_pose(&mut r, *slot, pose);
         }
@@ -286,7 +286,7 @@ impl Slam {
             self.keyframes.iter().map(|k| (k.slot, k.world_from_camera)).collect();
         let (engine, map, scratch) = self.mapped()?;
         for some in keyframes.chunks(ITERATIONS_PER_RECORDING as usize) {
-            let mut r = Recording::default();
+            let mut r = Commands::default();
             for (slot, pose) in some {
                 map.frames.upload_pose(&mut r, *slot, pose);
                 fusion::record_forward(&mut r, map, scratch, *slot);
@@ -391,7 +391,7 @@ impl Slam {
         };
         let (engine, map, scratch) = self.mapped()?;
         let mut touched = BTreeSet::new();
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         map.upload_class_weights(&mut r, &ray_weights, &token_weights, &rarity);
         for (slot, pose) in &keyframes {
             map.frames.upload_pose(&mut r, *slot, pose);
@@ -477,7 +477,7 @@ impl Slam {
 /// Submits what is recorded once it is enough, or all there is, and starts anew.
 async fn submit_when_due(
     engine: &mut Engine,
-    r: &mut Recording,
+    r: &mut Commands,
     done: u32,
     iterations: u32,
     breathe: Option<Breathe>,

@@ -22,6 +22,7 @@ pub use parameters::ParameterCounts;
 pub use resume::Resuming;
 
 use crate::{
+    commands::Commands,
     config::{Config, ConfigError, Tracker},
     engine::{Engine, EngineError},
     frame::{Bounds, Frame, SequenceInfo},
@@ -29,7 +30,6 @@ use crate::{
     map::{AnchorCounts, Map, Scratch},
     mesh::MeshError,
     pose::Pose,
-    recording::Recording,
     track::odometry::{ColourRegistration, Odometer, OdometryConfig, OdometryError},
 };
 use alloc::{borrow::Cow, boxed::Box, format, string::String, vec::Vec};
@@ -320,7 +320,7 @@ impl Slam {
         for slot in slots {
             let (engine, map, _) = self.mapped()?;
             let image = map.frames.read_color(engine, slot).await?;
-            let mut r = Recording::default();
+            let mut r = Commands::default();
             map.frames.upload_color(&mut r, slot, &change.resampled(&image, &camera));
             engine.submit(&r)?;
         }

@@ -1,5 +1,6 @@
 //! Layers of the fusion, and which of them one dispatch runs side by side.
 use crate::{
+    commands::{Buffer, Commands, workgroups_1d},
     config::FusionConfig,
     engine::{Engine, EngineError},
     kernels::{
@@ -11,7 +12,6 @@ use crate::{
             TokenLayer,
         },
     },
-    recording::{Buffer, Recording, workgroups_1d},
 };
 use alloc::{vec, vec::Vec};
 
@@ -210,7 +210,7 @@ impl Schedule {
         }]);
         let words: &[u32] = bytemuck::cast_slice(&table);
         let buffer = e.create("token layers", words.len())?;
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         r.upload(buffer, 0, words);
         e.submit(&r)?;
         Ok(Schedule { table: buffer, forward, backward, weights, features, head })

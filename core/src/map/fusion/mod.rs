@@ -8,13 +8,13 @@ pub use passes::{record_backward, record_forward, record_step};
 
 use super::{ParameterTensor, TokenGrid};
 use crate::{
+    commands::{Buffer, Commands},
     config::FusionConfig,
     engine::{Engine, EngineError},
     kernels::{
         shared::random_f32,
         tokens::{LOGITS_AT, NO_BIAS, RAW_HISTOGRAM},
     },
-    recording::{Buffer, Recording},
 };
 use alloc::{vec, vec::Vec};
 use layers::{Schedule, layers};
@@ -122,7 +122,7 @@ impl Fusion {
                 }
             }
         }
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         r.upload(fusion.parameters.values, 0, &w);
         e.submit(&r)?;
         Ok(fusion)

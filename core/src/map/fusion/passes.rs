@@ -5,6 +5,7 @@ use super::{
 };
 use crate::{
     call::Call,
+    commands::{Buffer, Commands},
     kernels::{
         attend_keys, attend_queries, attend_tokens, extract_tokens, gate_backward, gate_tokens,
         recall_tokens,
@@ -17,17 +18,16 @@ use crate::{
     },
     layout::{FieldParams, HEAD_FLOATS},
     map::{Map, Scratch, parameters::AdamStep},
-    recording::{Buffer, Recording},
 };
 
 /// Fused features of a stored frame; they become the targets of its rays. Records nothing without a
 /// fusion, as all passes here.
-pub fn record_forward(r: &mut Recording, map: &Map, scratch: &Scratch, slot: u32) {
+pub fn record_forward(r: &mut Commands, map: &Map, scratch: &Scratch, slot: u32) {
     record_tokens(r, map, scratch, slot, false);
 }
 
 /// Forward pass, losses and gradients of the fusion on a stored frame; nothing moves yet.
-pub fn record_backward(r: &mut Recording, map: &Map, scratch: &Scratch, slot: u32) {
+pub fn record_backward(r: &mut Commands, map: &Map, scratch: &Scratch, slot: u32) {
     let (Some(f), Some(s)) = (&map.fusion, &scratch.fusion) else { return };
     let p = token_params(map, f, slot);
     let n = f.count();
@@ -74,7 +74,7 @@ pub fn record_backward(r: &mut Recording, map: &Map, scratch: &Scratch, slot: u3
 }
 
 /// One training step of the fusion (and the class head) on a stored frame.
-pub fn record_step(r: &mut Recording, map: &mut Map, scratch: &Scratch, slot: u32, rate_head: f64) {
+pub fn record_step(r: &mut Commands, map: &mut Map, scratch: &Scratch, slot: u32, rate_head: f64) {
     record_backward(r, map, scratch, slot);
     let Some(f) = &mut map.fusion else { return };
     f.step += 1;
@@ -86,7 +86,7 @@ pub fn record_step(r: &mut Recording, map: &mut Map, scratch: &Scratch, slot: u3
     map.decoders.record_adam(r, map.status, step);
 }
 
-fn record_tokens(r: &mut Recording, map: &Map, scratch: &Scratch, slot: u32, train: bool) {
+fn record_tokens(r: &mut Commands, map: &Map, scratch: &Scratch, slot: u32, train: bool) {
     let (Some(f), Some(s)) = (&map.fusion, &scratch.fusion) else { return };
     let p = token_params(map, f, slot);
     let n = f.count();
@@ -137,7 +137,7 @@ fn feature_inputs(f: &Fusion, p: TokenParams) -> TokenParams {
 }
 
 fn record_layers(
-    r: &mut Recording,
+    r: &mut Commands,
     f: &Fusion,
     s: &FusionScratch,
     group: &Group,
@@ -159,7 +159,7 @@ fn record_layers(
 }
 
 fn record_weights(
-    r: &mut Recording,
+    r: &mut Commands,
     f: &Fusion,
     s: &FusionScratch,
     group: &Group,
@@ -227,7 +227,7 @@ fn second(f: &Fusion, p: TokenParams) -> TokenParams {
     }
 }
 
-fn record_attention(r: &mut Recording, f: &Fusion, s: &FusionScratch, p: &TokenParams) {
+fn record_attention(r: &mut Commands, f: &Fusion, s: &FusionScratch, p: &TokenParams) {
     attend_tokens::Buffers { tokens: s.tokens }.record_workgroups(
         r,
         p,
@@ -235,7 +235,7 @@ fn record_attention(r: &mut Recording, f: &Fusion, s: &FusionScratch, p: &TokenP
     );
 }
 
-fn record_attention_backward(r: &mut Recording, f: &Fusion, s: &FusionScratch, p: &TokenParams) {
+fn record_attention_backward(r: &mut Commands, f: &Fusion, s: &FusionScratch, p: &TokenParams) {
     attend_queries::Buffers { tokens: s.tokens, token_gradient: s.token_gradient }
         .record_workgroups(r, p, [f.count().div_ceil(TILE) as u32, 1, 1]);
     attend_keys::Buffers { tokens: s.tokens, token_gradient: s.token_gradient }.record_workgroups(

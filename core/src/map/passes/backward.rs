@@ -1,6 +1,7 @@
 //! From the losses back to gradients of planes, poses and what the decoders' gradients need.
 use crate::{
     call::Call,
+    commands::Commands,
     kernels::{
         composite_backward, geometry_backward, geometry_weights, pose_gradient, scatter_geometry,
         scatter_surface,
@@ -8,11 +9,10 @@ use crate::{
     },
     layout::{BACKWARD_STRIP, FieldParams},
     map::{Batch, Map, Scratch, sample_head, scratch::GEOMETRY_ROWS},
-    recording::Recording,
 };
 
 /// Gradients down to the signed distances and, as the flags say, features and positions.
-pub fn record_backward(r: &mut Recording, map: &Map, scratch: &Scratch, b: &Batch<'_>) {
+pub fn record_backward(r: &mut Commands, map: &Map, scratch: &Scratch, b: &Batch<'_>) {
     let p = map.params(b);
     let (rays, samples) = (p.rays as usize, (p.rays * p.samples) as usize);
     let (geometry, decoders) = (map.geometry.values, map.decoders.values);
@@ -71,7 +71,7 @@ pub fn record_backward(r: &mut Recording, map: &Map, scratch: &Scratch, b: &Batc
 }
 
 /// Gradients of the semantics alone: what [`record_semantic_step`](super::record_semantic_step) needs.
-pub fn record_semantic_backward(r: &mut Recording, map: &Map, scratch: &Scratch, b: &Batch<'_>) {
+pub fn record_semantic_backward(r: &mut Commands, map: &Map, scratch: &Scratch, b: &Batch<'_>) {
     if map.sample_head.is_some() {
         sample_head::record_backward(r, map, scratch, &map.params(b));
     } else {
@@ -79,7 +79,7 @@ pub fn record_semantic_backward(r: &mut Recording, map: &Map, scratch: &Scratch,
     }
 }
 
-fn record_scatter_surface(r: &mut Recording, map: &Map, scratch: &Scratch, b: &Batch<'_>) {
+fn record_scatter_surface(r: &mut Commands, map: &Map, scratch: &Scratch, b: &Batch<'_>) {
     let p = FieldParams { classes: map.ray_classes(), ..map.params(b) };
     let rays = p.rays as usize;
     scatter_surface::Buffers {

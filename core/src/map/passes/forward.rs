@@ -1,18 +1,18 @@
 //! From the window's images to rays, samples, renderings and losses.
 use crate::{
     call::Call,
+    commands::Commands,
     kernels::{
         composite, decode_rays, geometry_forward, mask_rays, sample_depths, sample_rays,
         shared::{FLAG_MAP, FLAG_MASK, FLAG_POSE},
     },
     layout::FieldParams,
     map::{Batch, Map, Scratch, sample_head},
-    recording::Recording,
 };
 
 /// Rays, samples, signed distances, compositing, decoding and their losses. A per-sample head
 /// is run here for views only: training runs it with its gradients, and poses do not see it.
-pub fn record_forward(r: &mut Recording, map: &Map, scratch: &Scratch, b: &Batch<'_>) {
+pub fn record_forward(r: &mut Commands, map: &Map, scratch: &Scratch, b: &Batch<'_>) {
     let full = map.params(b);
     let p = FieldParams { classes: map.ray_classes(), ..full };
     let (rays, samples) = (p.rays as usize, (p.rays * p.samples) as usize);

@@ -1,6 +1,7 @@
 //! The field at given points: distances, surfaces, and normal equations of a pose.
 use crate::{
     call::Call,
+    commands::Commands,
     engine::{Engine, EngineError},
     kernels::{
         align_points::{self, ALIGN_ROW},
@@ -9,12 +10,11 @@ use crate::{
     },
     map::{Map, QUERY_POINTS_MAX, Scratch, sample_head},
     pose::Pose,
-    recording::Recording,
 };
 use alloc::vec::Vec;
 
 /// Uploads camera-frame points (x, y, z \[m\], intensity) for [`align`].
-pub fn upload_pixels(r: &mut Recording, scratch: &Scratch, pixels: &[[f32; 4]]) {
+pub fn upload_pixels(r: &mut Commands, scratch: &Scratch, pixels: &[[f32; 4]]) {
     r.upload(scratch.points, 0, pixels);
 }
 
@@ -29,7 +29,7 @@ pub async fn align(
     pose: &Pose,
     count: u32,
 ) -> Result<[f64; ALIGN_ROW], EngineError> {
-    let mut r = Recording::default();
+    let mut r = Commands::default();
     map.frames.upload_pose(&mut r, 0, pose);
     let mut p = map.base;
     p.rays = count;
@@ -100,7 +100,7 @@ async fn query(
     let floats = if flags & FLAG_MAP == 0 { 1 } else { 8 };
     let mut out = Vec::with_capacity(points.len() * floats);
     for chunk in points.chunks(QUERY_POINTS_MAX) {
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         r.upload(scratch.points, 0, chunk);
         let mut p = map.base;
         p.rays = chunk.len() as u32;

@@ -1,6 +1,7 @@
 //! Adam's steps of map and poses, with the decoders' gradients that they need.
 use crate::{
     call::Call,
+    commands::Commands,
     kernels::{
         pose_step::{self, PoseStepParams},
         reduce_partials::{self, ReducePartialsParams},
@@ -17,14 +18,13 @@ use crate::{
         sample_head,
         scratch::{DECODER_CHUNK, GEOMETRY_ROWS},
     },
-    recording::Recording,
 };
 use alloc::vec;
 use mte_slam_shaders::decoders::{COLOR, Layer, SEMANTIC};
 
 /// One Adam step of the window's poses from the last backward pass.
 pub fn record_pose_step(
-    r: &mut Recording,
+    r: &mut Commands,
     map: &Map,
     scratch: &Scratch,
     b: &Batch<'_>,
@@ -52,7 +52,7 @@ pub fn record_pose_step(
 
 /// Decoder gradients from the last backward pass, then Adam on everything.
 pub fn record_step(
-    r: &mut Recording,
+    r: &mut Commands,
     map: &mut Map,
     scratch: &Scratch,
     b: &Batch<'_>,
@@ -78,7 +78,7 @@ pub fn record_step(
 /// As [`record_step`], of the semantic planes, their decoder and the class head. The
 /// batch's weight of colour must be 0.
 pub fn record_semantic_step(
-    r: &mut Recording,
+    r: &mut Commands,
     map: &mut Map,
     scratch: &Scratch,
     b: &Batch<'_>,
@@ -88,7 +88,7 @@ pub fn record_semantic_step(
 }
 
 fn record_updates(
-    r: &mut Recording,
+    r: &mut Commands,
     map: &mut Map,
     scratch: &Scratch,
     b: &Batch<'_>,

@@ -59,7 +59,7 @@ impl<T> From<Buffer<T>> for BufferId {
     }
 }
 
-/// One step of a recording. Offsets and lengths count 4-byte words.
+/// One command for a device. Offsets and lengths count 4-byte words.
 #[derive(Clone, Debug)]
 pub enum Command {
     /// Writes host data into a buffer.
@@ -109,13 +109,13 @@ pub enum Command {
 /// Commands in the order in which they take effect. Each command sees the results of all earlier
 /// ones. Mistakes (ranges, binding counts, unknown buffers) are reported when it is submitted.
 #[derive(Clone, Debug, Default)]
-pub struct Recording {
+pub struct Commands {
     /// The commands so far.
-    pub commands: Vec<Command>,
+    pub list: Vec<Command>,
 }
 
-impl Recording {
-    /// An empty recording.
+impl Commands {
+    /// No commands.
     pub fn new() -> Self {
         Self::default()
     }
@@ -125,7 +125,7 @@ impl Recording {
     pub fn upload<T: Pod>(&mut self, buffer: impl Into<BufferId>, offset_words: usize, data: &[T]) {
         let (buffer, data) = (buffer.into(), to_words(data));
         if !data.is_empty() {
-            self.commands.push(Command::Upload { buffer, offset_words, data });
+            self.list.push(Command::Upload { buffer, offset_words, data });
         }
     }
 
@@ -133,7 +133,7 @@ impl Recording {
     pub fn clear(&mut self, buffer: impl Into<BufferId>, offset_words: usize, words: usize) {
         let buffer = buffer.into();
         if words > 0 {
-            self.commands.push(Command::Clear { buffer, offset_words, words });
+            self.list.push(Command::Clear { buffer, offset_words, words });
         }
     }
 
@@ -149,7 +149,7 @@ impl Recording {
         let (src, dst) = (src.into(), dst.into());
         if words > 0 {
             let command = Command::Copy { src, src_offset_words, dst, dst_offset_words, words };
-            self.commands.push(command);
+            self.list.push(command);
         }
     }
 
@@ -164,7 +164,7 @@ impl Recording {
         workgroups: [u32; 3],
     ) {
         if !workgroups.contains(&0) {
-            self.commands.push(Command::Dispatch {
+            self.list.push(Command::Dispatch {
                 kernel,
                 bindings: bindings.to_vec(),
                 params: to_words(core::slice::from_ref(params)),
@@ -187,13 +187,13 @@ impl Recording {
     }
 
     /// Appends the commands of `other`.
-    pub fn append(&mut self, other: Recording) {
-        self.commands.extend(other.commands);
+    pub fn append(&mut self, other: Commands) {
+        self.list.extend(other.list);
     }
 
     /// Forgets the commands and keeps the memory.
     pub fn reset(&mut self) {
-        self.commands.clear();
+        self.list.clear();
     }
 }
 
@@ -236,13 +236,13 @@ mod tests {
 
     #[test]
     fn empty_work_records_nothing_and_bytes_are_padded() {
-        let mut recording = Recording::new();
-        recording.upload::<f32>(BufferId(0), 0, &[]);
-        recording.clear(BufferId(0), 3, 0);
-        recording.copy(BufferId(0), 0, BufferId(1), 0, 0);
-        assert!(recording.commands.is_empty());
-        recording.upload(BufferId(0), 2, &[1u8, 2, 3, 4, 5]);
-        match &recording.commands[..] {
+        let mut commands = Commands::new();
+        commands.upload::<f32>(BufferId(0), 0, &[]);
+        commands.clear(BufferId(0), 3, 0);
+        commands.copy(BufferId(0), 0, BufferId(1), 0, 0);
+        assert!(commands.list.is_empty());
+        commands.upload(BufferId(0), 2, &[1u8, 2, 3, 4, 5]);
+        match &commands.list[..] {
             [Command::Upload { data, .. }] => assert_eq!(data[..], [0x0403_0201, 5]),
             other => panic!("{other:?}"),
         }
