@@ -1,6 +1,6 @@
-// Normal equations of aligning a depth image to the field: one look-up a pixel, at the back-projected point.
+// Normal equations of aligning a depth image to the field: one look-up per pixel, at the back-projected point.
 // r_s = distance there [m], r_c = intensity of the field minus intensity of the pixel; Geman-McClure weights.
-// One invocation a pixel, one row of 32 floats a workgroup:
+// One invocation per pixel, one row of 32 floats per workgroup:
 // 21 upper triangle of J^T W J, 6 J^T W r, sum w r_s^2, sum w r_c^2, points, sum |r_s|, sum |r_c|.
 #import shared/planes.wgsl
 #import shared/geometry.wgsl

@@ -1,4 +1,4 @@
-// Gradients of the attention at its keys and values, streamed over tiles of queries. One invocation a key.
+// Gradients of the attention at its keys and values, streamed over tiles of queries. One invocation per key.
 #import shared/tokens.wgsl
 
 #bindings

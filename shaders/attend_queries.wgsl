@@ -1,4 +1,4 @@
-// Gradients of the attention at its queries (and at what was added behind it). One invocation a query.
+// Gradients of the attention at its queries (and at what was added behind it). One invocation per query.
 #import shared/tokens.wgsl
 
 #bindings

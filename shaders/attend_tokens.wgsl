@@ -1,5 +1,5 @@
 // Cross-attention softmax(Q K^T / sqrt(16)) V over the tokens of an image (paper eqs. 1-4), streamed over tiles of keys
-// with an online softmax. One invocation a query.
+// with an online softmax. One invocation per query.
 #import shared/tokens.wgsl
 
 #bindings

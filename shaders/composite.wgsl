@@ -1,4 +1,4 @@
-// Weights of a ray's intervals, composited depth, opacity and features. One invocation a ray.
+// Weights of a ray's intervals, composited depth, opacity and features. One invocation per ray.
 // Features are composited before their decoders, which then run once a ray.
 #import shared/dispatch.wgsl
 #import shared/flags.wgsl

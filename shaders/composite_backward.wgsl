@@ -1,5 +1,5 @@
-// Gradients at the signed distances: through the interval weights (depth, colour), and the distance losses.
-// One invocation a ray.
+// Gradients at the signed distances: through the interval weights (depth, color), and the distance losses.
+// One invocation per ray.
 #import shared/dispatch.wgsl
 #import shared/flags.wgsl
 #import shared/rays.wgsl

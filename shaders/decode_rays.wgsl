@@ -1,5 +1,5 @@
 // Decoders and class head on composited features, their losses, and the gradients back to the features.
-// One invocation a ray. Colour 32-32-3 with sigmoid, semantic feature 32-32-16, class head 16-C linear.
+// One invocation per ray. Color 32-32-3 with sigmoid, semantic feature 32-32-16, class head 16-C linear.
 #import shared/dispatch.wgsl
 #import shared/flags.wgsl
 #import shared/rays.wgsl
@@ -26,7 +26,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     let rgb = color_output(hc);
     let geometry = ray_state[state + ${STATE_DEPTH}u];
 
-    // Colour: mean squared error over the three channels, on rays that meet a surface.
+    // Color: mean squared error over the three channels, on rays that meet a surface.
     let difference = select(rgb - r.color, vec3f(0.0), masked);
     let loss_color = dot(difference, difference) / 3.0;
     let drgb = difference * (2.0 / 3.0 * params.weight_color * inv_rays);

@@ -1,4 +1,4 @@
-// Raw features of each 8 x 8 sampled patch: geometry encoding, colours, class histogram. One invocation a token.
+// Raw features of each 8 x 8 sampled patch: geometry encoding, colors, class histogram. One invocation per token.
 #import shared/angle.wgsl
 #import shared/dispatch.wgsl
 #import shared/tokens.wgsl

@@ -1,4 +1,4 @@
-// Gradients through the gating, from F to the gate's convolution and the three modalities. One invocation a token.
+// Gradients through the gating, from F to the gate's convolution and the three modalities. One invocation per token.
 #import shared/dispatch.wgsl
 #import shared/tokens.wgsl
 

@@ -1,4 +1,4 @@
-// Normalised gating and fusion of geometry, local semantics and refined appearance (paper eqs. 7, 8). One invocation a token.
+// Normalised gating and fusion of geometry, local semantics and refined appearance (paper eqs. 7, 8). One invocation per token.
 #import shared/dispatch.wgsl
 #import shared/tokens.wgsl
 

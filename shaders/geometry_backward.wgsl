@@ -1,5 +1,5 @@
 // From gradients at the signed distances to gradients at the plane features (written over the features) and,
-// for pose refinement, at the sample positions. One invocation a strip of samples.
+// for pose refinement, at the sample positions. One invocation per strip of samples.
 #import shared/dispatch.wgsl
 #import shared/flags.wgsl
 #import shared/rays.wgsl
@@ -14,7 +14,7 @@ const STRIP: u32 = ${BACKWARD_STRIP}u;
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     load_geometry_decoder(lane);
-    // A strip of samples an invocation, idle ones skipped in a loop of their own (see composite).
+    // A strip of samples per invocation, idle ones skipped in a loop of their own (see composite).
     let count = params.rays * params.samples;
     // Interleaved, so that every lane gets its share of the samples near surfaces.
     let first = linear_workgroup(wid, groups) * WORKGROUP_SIZE * STRIP + lane;

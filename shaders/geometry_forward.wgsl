@@ -1,4 +1,4 @@
-// Signed distance at every sample. One invocation a sample.
+// Signed distance at every sample. One invocation per sample.
 #import shared/dispatch.wgsl
 #import shared/flags.wgsl
 #import shared/rays.wgsl

@@ -67,7 +67,7 @@ fn next_duplicate(i: u32, cursor: u32) -> u32 {
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(local_invocation_index) lane: u32) {
-    // One lane an anchor.
+    // One lane per anchor.
     let mine = lane * ${ANCHOR_VEC4}u;
     class_at[lane] = FREE;
     marked[lane] = 0u;

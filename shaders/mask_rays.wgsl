@@ -2,7 +2,7 @@
 // median. One workgroup; the median comes from a histogram over the float's exponent and 4 bits of mantissa.
 #bindings
 
-// Bins from 2^-16 m on, 16 an octave.
+// Bins from 2^-16 m on, 16 per octave.
 var<workgroup> bins: array<atomic<u32>, 512>;
 var<workgroup> threshold: f32;
 

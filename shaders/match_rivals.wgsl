@@ -1,5 +1,5 @@
 // The nearest anchors of the head's class and of another, for every ray; the ray counts for the head's class from here on.
-// One invocation a ray.
+// One invocation per ray.
 #import shared/dispatch.wgsl
 #import shared/rays.wgsl
 

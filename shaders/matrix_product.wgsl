@@ -1,5 +1,5 @@
 // Product of two matrices, tile by tile through workgroup memory: a layer on every sample, its gradients at inputs,
-// and those at weights. One workgroup a (64 rows, 64 columns, split of the inner dimension), one invocation 4 x 4 of them.
+// and those at weights. One workgroup per (64 rows, 64 columns, split of the inner dimension), one invocation per 4 x 4 of them.
 #bindings
 
 const NONE: u32 = 0xffffffffu;

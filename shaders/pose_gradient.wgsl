@@ -1,5 +1,5 @@
 // Adds the gradients at a ray's sample positions to its pose gradient (translation, rotation about the
-// camera's centre, both in world axes). One invocation a ray.
+// camera's centre, both in world axes). One invocation per ray.
 #import shared/dispatch.wgsl
 #import shared/rays.wgsl
 

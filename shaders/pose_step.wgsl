@@ -1,4 +1,4 @@
-// One Adam step on the pose of each window frame; one workgroup a frame, its rays summed in a fixed order.
+// One Adam step on the pose of each window frame; one workgroup per frame, its rays summed in a fixed order.
 // The pose with the smallest loss so far is kept beside (the loss belongs to the pose before the step).
 #import shared/angle.wgsl
 

@@ -1,4 +1,4 @@
-// The field at single points: signed distance, colour, class. One invocation a point.
+// The field at single points: signed distance, color, class. One invocation per point.
 #import shared/dispatch.wgsl
 #import shared/flags.wgsl
 #import shared/planes.wgsl

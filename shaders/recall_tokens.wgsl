@@ -1,4 +1,4 @@
-// The map's semantic feature at each token's point, an input of the fusion. One invocation a token.
+// The map's semantic feature at each token's point, an input of the fusion. One invocation per token.
 #import shared/dispatch.wgsl
 #import shared/planes.wgsl
 #import shared/semantic.wgsl

@@ -1,4 +1,4 @@
-// Sums rows of partial gradients in a fixed order. One invocation a column.
+// Sums rows of partial gradients in a fixed order. One invocation per column.
 #import shared/dispatch.wgsl
 
 #bindings

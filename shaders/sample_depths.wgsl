@@ -1,4 +1,4 @@
-// Places the samples of each ray, sorted. One invocation a ray.
+// Places the samples of each ray, sorted. One invocation per ray.
 // With a depth: stratified up to behind the surface, and stratified around it. Without: the trained signed
 // distance at the stratified samples gives weights, and the second round is drawn from them.
 #import shared/dispatch.wgsl

@@ -1,4 +1,4 @@
-// Semantic plane features of a ray's samples, for a head that runs on every one of them. One invocation a (ray, slot).
+// Semantic plane features of a ray's samples, for a head that runs on every one of them. One invocation per (ray, slot).
 // As many slots as samples: slot i is interval i. Fewer (views): the first intervals that carry weight, front to back.
 #import shared/dispatch.wgsl
 #import shared/rays.wgsl

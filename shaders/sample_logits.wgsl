@@ -1,5 +1,5 @@
 // Class logits of the samples composited along the ray, the ray's class and cross-entropy, and the gradients at the
-// samples' logits, which take their place. One workgroup a ray, one invocation every 64th class.
+// samples' logits, which take their place. One workgroup per ray, one invocation every 64th class.
 #import shared/dispatch.wgsl
 #import shared/rays.wgsl
 

@@ -1,4 +1,4 @@
-// Draws the pixels of a batch and makes their world rays. One invocation a ray.
+// Draws the pixels of a batch and makes their world rays. One invocation per ray.
 #import shared/dispatch.wgsl
 #import shared/flags.wgsl
 #import shared/random.wgsl
@@ -68,7 +68,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     out.origin = vec3f(poses[b + 9u], poses[b + 10u], poses[b + 11u]);
     out.depth = f32(raw) * params.depth_unit;
     out.frame = frame | (slot << 8u);
-    // A rendered view may have another size than the stored images: it has no colours to compare with.
+    // A rendered view may have another size than the stored images: it has no colors to compare with.
     var c = 0xff000000u;
     if ((params.flags & (FLAG_DENSE | FLAG_GUIDED)) != FLAG_DENSE) {
         c = color_images[slot * pixels + pixel];

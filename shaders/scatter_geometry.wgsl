@@ -1,5 +1,5 @@
-// Adds feature gradients into the geometry planes, fixed point. One invocation a (ray, level, plane, channel
-// quad): samples of the ray that share a cell are summed first, so that a cell costs 16 atomics, not 16 a sample.
+// Adds feature gradients into the geometry planes, fixed point. One invocation per (ray, level, plane, channel
+// quad): samples of the ray that share a cell are summed first, so that a cell costs 16 atomics, not 16 per sample.
 #import shared/dispatch.wgsl
 #import shared/rays.wgsl
 #import shared/planes.wgsl

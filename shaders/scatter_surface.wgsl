@@ -1,6 +1,6 @@
 // Adds feature gradients into the appearance and semantic planes, fixed point. All samples of a ray share one
 // gradient (features are composited before decoding), so per cell only four scalars are summed.
-// One invocation a (ray, modality, level, plane, channel quad).
+// One invocation per (ray, modality, level, plane, channel quad).
 #import shared/dispatch.wgsl
 #import shared/rays.wgsl
 #import shared/planes.wgsl

@@ -1,4 +1,4 @@
-// Anchors settle where the nearest one tells the head's class: generalised learning vector quantisation. One workgroup an anchor.
+// Anchors settle where the nearest one gives the head's class: generalised learning vector quantisation. One workgroup per anchor.
 #import shared/rays.wgsl
 #import shared/head.wgsl
 #import shared/lane_sums.wgsl

@@ -1,5 +1,5 @@
-// Layers on the token grid: linear, 3x3 or depthwise convolution, leaky rectifier. One invocation a (token, 4 outputs).
-// Weights of a tap are input-major; a depthwise tap has one weight a channel. Off the grid inputs are 0.
+// Layers on the token grid: linear, 3x3 or depthwise convolution, leaky rectifier. One invocation per (token, 4 outputs).
+// Weights of a tap are input-major; a depthwise tap has one weight per channel. Off the grid inputs are 0.
 #import shared/dispatch.wgsl
 #import shared/tokens.wgsl
 #import shared/token_layers.wgsl

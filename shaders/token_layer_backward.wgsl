@@ -1,4 +1,4 @@
-// Adds layers' contributions to the gradients at their inputs, of which no two share any. One invocation a (token, input).
+// Adds layers' contributions to the gradients at their inputs, of which no two share any. One invocation per (token, input).
 #import shared/dispatch.wgsl
 #import shared/tokens.wgsl
 #import shared/token_layers.wgsl

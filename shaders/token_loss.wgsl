@@ -1,5 +1,5 @@
-// What trains the fusion: class-balanced cross-entropy and L1 of the colour, both read from F. F itself becomes the target
-// of the rays in the token's patch. One invocation a token.
+// What trains the fusion: class-balanced cross-entropy and L1 of the color, both read from F. F itself becomes the target
+// of the rays in the token's patch. One invocation per token.
 #import shared/dispatch.wgsl
 #import shared/tokens.wgsl
 

@@ -1,5 +1,5 @@
 // Gradients of layers' weights and biases: sums over a chunk of tokens of input * delta; reduce_partials adds the chunks.
-// One invocation a (chunk, tap and input, 4 outputs), or a (chunk, 4 biases).
+// One invocation per (chunk, tap and input, 4 outputs), or a (chunk, 4 biases).
 #import shared/dispatch.wgsl
 #import shared/tokens.wgsl
 #import shared/token_layers.wgsl

@@ -1,4 +1,4 @@
-// Anchors follow the features matched to them (paper eqs. 11, 12). One workgroup an anchor.
+// Anchors follow the features matched to them (paper eqs. 11, 12). One workgroup per anchor.
 #import shared/rays.wgsl
 #import shared/lane_sums.wgsl
 

@@ -1,5 +1,5 @@
 // Gradients of the decoders that run once a ray: dW[i][o] = sum over rays of input_i * delta_o, and the bias.
-// One invocation a (chunk of rays, i, four o); chunks are summed by reduce_partials. Input row I is the bias (input 1).
+// One invocation per (chunk of rays, i, four o); chunks are summed by reduce_partials. Input row I is the bias (input 1).
 #import shared/dispatch.wgsl
 
 #bindings

@@ -39,6 +39,39 @@ impl Sink<Handles> for Ids {
 }
 
 /// The buffers of a kernel's call, by binding: what [`kernel!`](crate::kernel!) calls `Buffers`.
+/// ```
+/// use mte_slam_core::{
+///     call::Call,
+///     commands::{Buffer, Commands},
+///     engine::Engine,
+///     kernels::reduce_partials::{Buffers, ReducePartialsParams},
+/// };
+///
+/// let mut engine = Engine::cpu();
+/// let partials: Buffer<f32> = engine.create("partials", 6)?;
+/// let gradient: Buffer<f32> = engine.create("gradient", 3)?;
+/// let mut commands = Commands::new();
+/// commands.upload(partials, 0, &[1.0_f32, 2.0, 3.0, 10.0, 20.0, 30.0]);
+/// let params = ReducePartialsParams { rows: 2, columns: 3, row: 3, offset: 0 };
+/// Buffers { partials, gradient }.record(&mut commands, &params, 3);
+/// engine.submit(&commands)?;
+/// assert_eq!(pollster::block_on(engine.read_as::<f32>(gradient, 0, 3))?, [11.0, 22.0, 33.0]);
+/// # Ok::<(), mte_slam_core::engine::EngineError>(())
+/// ```
+/// A buffer of other elements does not compile:
+/// ```compile_fail,E0308
+/// # use mte_slam_core::{call::Call, commands::{Buffer, Commands}, engine::Engine};
+/// # use mte_slam_core::kernels::reduce_partials::{Buffers, ReducePartialsParams};
+/// # let mut engine = Engine::cpu();
+/// let rays: Buffer<mte_slam_core::shaders::rays::Ray> = engine.create("rays", 12)?;
+/// let gradient: Buffer<f32> = engine.create("gradient", 3)?;
+/// Buffers { partials: rays, gradient }.record(
+///     &mut Commands::new(),
+///     &ReducePartialsParams::default(),
+///     3,
+/// );
+/// # Ok::<(), mte_slam_core::engine::EngineError>(())
+/// ```
 pub trait Call: BindingSet<Handles> {
     /// The kernel that is called.
     const KERNEL: &'static Kernel;

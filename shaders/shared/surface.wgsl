@@ -1,4 +1,4 @@
-// Colour decoder 32-32-3, semantic decoder 32-32-16, class head 16-C. Needs binding decoders: array<vec4f>.
+// Color decoder 32-32-3, semantic decoder 32-32-16, class head 16-C. Needs binding decoders: array<vec4f>.
 // `sw` holds the layers from COLOR_W1 = 0 on; their offsets are those of src/decoders.rs.
 // Loops stay loops here: these run once a ray, and unrolled they took a minute to compile on lavapipe.
 #import shared/head.wgsl
@@ -44,7 +44,7 @@ fn color_output(hidden: array<vec4f, 8>) -> vec3f {
     }
     return 1.0 / (1.0 + exp(-o.xyz));
 }
-// From the gradient at the colour's pre-activation to the hidden layer's deltas.
+// From the gradient at the color's pre-activation to the hidden layer's deltas.
 fn color_hidden_delta(hidden: array<vec4f, 8>, d: vec4f) -> array<vec4f, 8> {
     var h = hidden;
     for (var q = 0u; q < 8u; q++) {

@@ -57,6 +57,59 @@ element! {
     [f32; 4] => F32x4, f32;
 }
 
+/// Makes a `#[repr(C)]` struct of 4-byte scalars and vectors that a shader declares alike: as the
+/// parameters of a kernel or as the element of a buffer. Vectors must lie where WGSL puts them
+/// (of 4 and of 3 components at multiples of 16 bytes), which is checked at compile time.
+/// ```
+/// mte_slam_shaders::shared_struct! {
+///     /// What the kernel needs.
+///     pub struct ScaleParams {
+///         /// Number of values.
+///         count: u32,
+///         /// What they are multiplied by.
+///         factor: f32,
+///     }
+/// }
+/// # fn main() {}
+/// ```
+/// Fields are public. Engines pad parameters to a multiple of 16 bytes. The caller's crate needs
+/// `bytemuck` with its derive macros.
+#[macro_export]
+macro_rules! shared_struct {
+    (
+        $(#[$doc:meta])*
+        pub struct $name:ident {
+            $($(#[$field_doc:meta])* $field:ident: $type:ty),* $(,)?
+        }
+    ) => {
+        $(#[$doc])*
+        #[repr(C)]
+        #[derive(Copy, Clone, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+        pub struct $name {
+            $($(#[$field_doc])* pub $field: $type,)*
+        }
+
+        impl $crate::structs::SharedStruct for $name {
+            const LAYOUT: $crate::structs::StructLayout = $crate::structs::StructLayout {
+                name: stringify!($name),
+                fields: &[$($crate::structs::Field::new(
+                    stringify!($field),
+                    core::mem::offset_of!($name, $field),
+                    <$type as $crate::structs::FieldType>::KIND,
+                )),*],
+                size: size_of::<$name>(),
+            };
+        }
+
+        impl $crate::interface::Element for $name {
+            const TYPE: $crate::interface::ElementType = $crate::interface::ElementType::Struct(
+                &<$name as $crate::structs::SharedStruct>::LAYOUT,
+            );
+            type Host = $name;
+        }
+    };
+}
+
 /// One storage buffer of a kernel.
 #[derive(Copy, Clone, PartialEq, Eq, Debug)]
 pub struct Binding {

@@ -3,11 +3,11 @@ use crate::decoders;
 
 /// Floats of the geometry decoder in the decoder buffer.
 pub const GEOMETRY_FLOATS: usize = decoders::COLOR[0].weights;
-/// Floats of the colour and semantic decoders, behind it.
+/// Floats of the color and semantic decoders, behind the geometry decoder.
 pub const SURFACE_FLOATS: usize = decoders::END - GEOMETRY_FLOATS;
 /// First float of the class head.
 pub const HEAD_FLOATS: usize = decoders::END;
-/// Most stratified samples a ray.
+/// Most stratified samples per ray.
 pub const MAX_STRATIFIED: u32 = 128;
 /// Samples an invocation of geometry_backward goes through.
 pub const BACKWARD_STRIP: u32 = 8;
@@ -23,17 +23,17 @@ pub const RAY_OUT_FLOATS: usize = 12;
 pub const STATE_APPEARANCE: u32 = 0;
 /// Composited semantic features (8).
 pub const STATE_SEMANTIC: u32 = 8;
-/// Hidden activations of the colour decoder (8).
+/// Hidden activations of the color decoder (8).
 pub const STATE_COLOR_HIDDEN: u32 = 16;
 /// Hidden activations of the semantic decoder (8).
 pub const STATE_SEMANTIC_HIDDEN: u32 = 24;
 /// Semantic feature (4).
 pub const STATE_FEATURE: u32 = 32;
-/// Gradient at the colour's pre-activation (1).
+/// Gradient at the color's pre-activation (1).
 pub const STATE_COLOR_DELTA: u32 = 36;
 /// Gradient at the semantic feature (4).
 pub const STATE_FEATURE_DELTA: u32 = 37;
-/// Gradient at the colour decoder's hidden layer (8).
+/// Gradient at the color decoder's hidden layer (8).
 pub const STATE_COLOR_HIDDEN_DELTA: u32 = 41;
 /// Gradient at the semantic decoder's hidden layer (8).
 pub const STATE_SEMANTIC_HIDDEN_DELTA: u32 = 49;
@@ -72,7 +72,7 @@ shared_struct! {
         height: u32,
         /// Rays (or points) of the batch.
         rays: u32,
-        /// Samples a ray.
+        /// Samples per ray.
         samples: u32,
         /// Focal length \[pixels\].
         fx: f32,
@@ -98,7 +98,7 @@ shared_struct! {
         flags: u32,
         /// Rays of each window frame.
         rays_per_frame: u32,
-        /// Stratified samples a ray.
+        /// Stratified samples per ray.
         stratified: u32,
         /// Samples near the surface.
         surface_samples: u32,
@@ -130,7 +130,7 @@ shared_struct! {
         weight_tail: f32,
         /// Weight of the depth loss.
         weight_depth: f32,
-        /// Weight of the colour loss.
+        /// Weight of the color loss.
         weight_color: f32,
         /// Weight of the cross-entropy.
         weight_semantic: f32,

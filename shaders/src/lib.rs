@@ -23,8 +23,6 @@ extern crate alloc;
 #[doc(hidden)]
 pub mod embed;
 #[macro_use]
-pub mod structs;
-#[macro_use]
 pub mod interface;
 mod constants;
 pub mod decoders;
@@ -35,6 +33,7 @@ pub mod layout;
 pub mod random;
 pub mod rays;
 pub mod shader;
+pub mod structs;
 pub mod tokens;
 
 pub use constants::CONSTANTS;

@@ -400,6 +400,8 @@ mod tests {
         for kernel in crate::kernels::ALL {
             let text = compose(kernel, &[]).unwrap();
             assert!(text.contains("fn main") && !text.contains("${"), "{}", kernel.name);
+            let known = |import: &str| SHARED.iter().any(|(path, _)| *path == import);
+            assert!(kernel.imports().all(known), "{}", kernel.name);
         }
     }
 }

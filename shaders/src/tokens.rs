@@ -5,7 +5,7 @@
 pub const GEOMETRY_INPUTS: u32 = 64;
 /// Bands of the positional encoding; wavelengths of 16 m, 8 m .. 0.25 m.
 pub const BANDS: u32 = 7;
-/// Floats of a patch: 8 x 8 colours.
+/// Floats of a patch: 8 x 8 colors.
 pub const PATCH_INPUTS: u32 = 192;
 /// Hidden units of the geometry embedding.
 pub const HIDDEN: u32 = 64;
@@ -19,9 +19,9 @@ pub const TILE: usize = 64;
 pub const RAW_GEOMETRY: u32 = 0;
 /// The map's semantic feature at the token's point.
 pub const RAW_MEMORY: u32 = 48;
-/// Colours of the patch, less one half.
+/// Colors of the patch, less one half.
 pub const RAW_PATCH: u32 = 64;
-/// Mean colour (3), 0.
+/// Mean color (3), 0.
 pub const RAW_MEAN: u32 = 256;
 /// World position (3) \[m\], 1 where the token has geometry.
 pub const RAW_POINT: u32 = 260;
@@ -55,7 +55,7 @@ pub const GATE_AT: u32 = 272;
 pub const STATISTICS_AT: u32 = 280;
 /// F.
 pub const FUSED_AT: u32 = 284;
-/// Colour read from F (3), loss.
+/// Color read from F (3), loss.
 pub const COLOR_AT: u32 = 300;
 /// Gradients at the class logits.
 pub const LOGITS_AT: u32 = 304;
@@ -107,17 +107,17 @@ shared_struct! {
         key_stride: u32,
         /// First column of what attention gives.
         output: u32,
-        /// Tokens a chunk of the weights' gradients.
+        /// Tokens per chunk of the weights' gradients.
         chunk: u32,
-        /// Floats a row of partial gradients.
+        /// Floats per row of partial gradients.
         row: u32,
         /// 1: write the gradients.
         train: u32,
         /// Weight of the cross-entropy.
         weight_class: f32,
-        /// Weight of the colour loss.
+        /// Weight of the color loss.
         weight_color: f32,
-        /// First weight of the colour head.
+        /// First weight of the color head.
         color_head: u32,
         /// Unused.
         spare0: u32,

@@ -127,7 +127,7 @@ pub enum EngineError {
     },
     /// More workgroups than a dispatch may have.
     #[error(
-        "kernel {kernel}: {workgroups:?} workgroups, the limit is 65535 a dimension and 2^32 - 1 \
+        "kernel {kernel}: {workgroups:?} workgroups, the limit is 65535 per dimension and 2^32 - 1 \
          in all"
     )]
     TooManyWorkgroups {

@@ -1,4 +1,4 @@
-//! Normal equations of aligning a depth image to the field, one look-up a pixel.
+//! Normal equations of aligning a depth image to the field, one look-up per pixel.
 use super::shared::{
     Grid, color_backward, color_hidden, color_output, cross, geometry_decoder, geometry_deltas,
     geometry_feature_gradient, surface_weights,

@@ -1,4 +1,4 @@
-//! Decoders and class head on composited features; the losses of colour, classes, feature and
+//! Decoders and class head on composited features; the losses of color, classes, feature and
 //! compression; their gradients.
 use super::shared::{
     FLAG_ANCHORS, Ray, class_logit, color_backward, color_hidden, color_output, head_row,

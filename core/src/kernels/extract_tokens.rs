@@ -1,4 +1,4 @@
-//! Raw features of each patch of an image: geometry, colours, class histogram.
+//! Raw features of each patch of an image: geometry, colors, class histogram.
 use super::{
     shared::{Vec3, cross, sin_cos},
     tokens::{BANDS, RAW_GEOMETRY, RAW_HISTOGRAM, RAW_MEAN, RAW_PATCH, RAW_POINT, TokenParams},

@@ -32,7 +32,7 @@ registry! {
     composite: COMPOSITE,
     /// Gradients at the signed distances.
     composite_backward: COMPOSITE_BACKWARD,
-    /// Colour, classes and losses.
+    /// Color, classes and losses.
     decode_rays: DECODE_RAYS,
     /// Raw features of image patches.
     extract_tokens: EXTRACT_TOKENS,

@@ -32,8 +32,8 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         let ray = all_rays[id];
         let unlabelled =
             ray.class() >= p.classes && p.weight_compression == 0.0 && p.weight_feature == 0.0;
-        let colourless = modality == 0 && p.weight_color == 0.0;
-        if ray.masked() || colourless || (modality == 1 && unlabelled) {
+        let colorless = modality == 0 && p.weight_color == 0.0;
+        if ray.masked() || colorless || (modality == 1 && unlabelled) {
             return;
         }
         let (scale, state) = if modality == 1 {

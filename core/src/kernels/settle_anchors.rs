@@ -1,4 +1,4 @@
-//! Anchors settle where the nearest one tells the head's class.
+//! Anchors settle where the nearest one gives the head's class.
 pub use mte_slam_shaders::kernels::settle_anchors::SettleAnchorsParams;
 
 use super::shared::likeliest_class;

@@ -250,7 +250,7 @@ pub fn geometry_feature_gradient(w: &[f32], d: &GeometryDeltas) -> Features {
     dense_back::<32, 16>(w, &d.d1)
 }
 
-/// The part of the decoder buffer that holds the colour and semantic decoders.
+/// The part of the decoder buffer that holds the color and semantic decoders.
 pub fn surface_weights(decoders: &[f32]) -> &[f32] {
     &decoders[GEOMETRY_FLOATS..GEOMETRY_FLOATS + SURFACE_FLOATS]
 }
@@ -260,7 +260,7 @@ fn within(w: &[f32], layer: Layer) -> &[f32] {
     &w[layer.weights - GEOMETRY_FLOATS..]
 }
 
-/// Hidden layer of the colour decoder. `w`: [`surface_weights`].
+/// Hidden layer of the color decoder. `w`: [`surface_weights`].
 pub fn color_hidden(w: &[f32], f: &Features) -> [f32; 32] {
     relu(dense::<32, 32>(w, f))
 }
@@ -271,7 +271,7 @@ pub fn color_output(w: &[f32], h: &[f32; 32]) -> Vec3 {
     core::array::from_fn(|k| 1.0 / (1.0 + libm::expf(-o[k])))
 }
 
-/// From the gradient at the colour's pre-activation to (hidden deltas, feature gradient).
+/// From the gradient at the color's pre-activation to (hidden deltas, feature gradient).
 pub fn color_backward(w: &[f32], h: &[f32; 32], d: &[f32; 4]) -> ([f32; 32], Features) {
     let dh = mask(dense_back::<32, 4>(within(w, COLOR[1]), d), h);
     (dh, dense_back::<32, 32>(w, &dh))

@@ -1,4 +1,4 @@
-//! What trains the fusion: classes and colour read from F. F is also the rays' target.
+//! What trains the fusion: classes and color read from F. F is also the rays' target.
 use super::{
     gate_tokens::sigmoid,
     shared::{class_logit, head_row},

@@ -1,4 +1,4 @@
-//! Normal equations of aligning a depth image to the field, one look-up a pixel.
+//! Normal equations of aligning a depth image to the field, one look-up per pixel.
 use crate::layout::FieldParams;
 
 interface! {

@@ -1,9 +1,9 @@
-//! Decoders and class head on composited features; the losses of colour, classes, feature and
+//! Decoders and class head on composited features; the losses of color, classes, feature and
 //! compression; their gradients.
 use crate::{layout::FieldParams, rays::Ray};
 
 interface! {
-    /// Colour, semantic feature and classes of each ray; losses; gradients at the features.
+    /// Color, semantic feature and classes of each ray; losses; gradients at the features.
     pub decode_rays {
         wgsl: shader!("decode_rays"),
         workgroup_size: 64,

@@ -1,4 +1,4 @@
-//! Raw features of each patch of an image: geometry, colours, class histogram.
+//! Raw features of each patch of an image: geometry, colors, class histogram.
 use crate::tokens::TokenParams;
 
 interface! {

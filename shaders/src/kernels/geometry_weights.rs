@@ -2,7 +2,7 @@
 use crate::layout::FieldParams;
 
 interface! {
-    /// Partial gradients of the geometry decoder, a row of 820 floats a workgroup. Samples come in
+    /// Partial gradients of the geometry decoder, a row per workgroup, laid out as the decoder. Samples come in
     /// tiles of 64; every `decoder_stride`-th tile is used and scaled up.
     pub geometry_weights {
         wgsl: shader!("geometry_weights"),

@@ -17,7 +17,7 @@ shared_struct! {
         /// Anchors of a class closer than this (squared) are duplicates; nor does anything spawn
         /// this close to an anchor.
         merge_distance: f32,
-        /// Duplicates merge once both move less than this an update.
+        /// Duplicates merge once both move less than this per update.
         stable: f32,
         /// Less important anchors are dropped.
         min_importance: f32,

@@ -14,7 +14,7 @@ shared_struct! {
         columns: u32,
         /// Inner dimension.
         depth: u32,
-        /// Inner indices a split; every split makes a product of its own.
+        /// Inner indices per split; every split makes a product of its own.
         split: u32,
         /// First float of the left matrix.
         left_offset: u32,

@@ -25,7 +25,7 @@ registry! {
     composite,
     /// Gradients at the signed distances.
     composite_backward,
-    /// Colour, classes and losses.
+    /// Color, classes and losses.
     decode_rays,
     /// Raw features of image patches.
     extract_tokens,

@@ -11,7 +11,7 @@ shared_struct! {
         learning_rate_translation: f32,
         /// Step size \[rad\].
         learning_rate_rotation: f32,
-        /// Weight of the colour loss.
+        /// Weight of the color loss.
         weight_color: f32,
         /// Weight of the depth loss.
         weight_depth: f32,

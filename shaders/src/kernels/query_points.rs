@@ -2,7 +2,7 @@
 use crate::layout::FieldParams;
 
 interface! {
-    /// Signed distance \[truncations\] at points; with `FLAG_MAP` colour and class too, with
+    /// Signed distance \[truncations\] at points; with `FLAG_MAP` color and class too, with
     /// `FLAG_ANCHORS` the class of the nearest anchor.
     pub query_points {
         wgsl: shader!("query_points"),

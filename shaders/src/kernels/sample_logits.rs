@@ -10,7 +10,7 @@ shared_struct! {
         first_ray: u32,
         /// Rays of the whole batch.
         batch_rays: u32,
-        /// Slots of samples a ray.
+        /// Slots of samples per ray.
         slots: u32,
         /// Classes.
         classes: u32,

@@ -1,4 +1,4 @@
-//! Anchors settle where the nearest one tells the head's class.
+//! Anchors settle where the nearest one gives the head's class.
 use crate::rays::Ray;
 
 shared_struct! {

@@ -1,8 +1,8 @@
-//! What trains the fusion: classes and colour read from F. F is also the rays' target.
+//! What trains the fusion: classes and color read from F. F is also the rays' target.
 use crate::tokens::TokenParams;
 
 interface! {
-    /// Class-balanced cross-entropy and colour loss of F, their gradients, and the rays' targets.
+    /// Class-balanced cross-entropy and color loss of F, their gradients, and the rays' targets.
     pub token_loss {
         wgsl: shader!("token_loss"),
         workgroup_size: 64,

@@ -9,7 +9,7 @@ shared_struct! {
         inputs: u32,
         /// Outputs of the layer.
         outputs: u32,
-        /// Rays a chunk; a chunk is a row of partials.
+        /// Rays per chunk; a chunk is a row of partials.
         chunk: u32,
         /// Offset of the inputs in a ray's state \[floats\].
         input_offset: u32,
@@ -17,7 +17,7 @@ shared_struct! {
         delta_offset: u32,
         /// 1: the deltas are the logits' gradients.
         from_logits: u32,
-        /// Floats a row of partials.
+        /// Floats per row of partials.
         row: u32,
         /// Where the weights start in a row.
         weight_offset: u32,
