@@ -150,7 +150,7 @@ fn work(
     progress.finish();
     let labelled = slam.labelled();
     let Processed { timings, earlier_s, notes, finish_s } = processed;
-    record.colour_scale = slam.colour_registration().scale;
+    record.color_scale = slam.color_registration().scale;
     // Without a single label the map's classes mean nothing: none are shown.
     let of_map = shown_classes(&slam);
     let estimates = slam.trajectory();
@@ -174,7 +174,7 @@ fn work(
     } else {
         ClassTruth::none("no pixel of any label image has a class", &info)
     };
-    let mut scores = ViewScores::new(&info, class_truth, slam.colour_registration());
+    let mut scores = ViewScores::new(&info, class_truth, slam.color_registration());
     if output.render_every > 0 {
         let chosen: Vec<_> = estimates.iter().step_by(output.render_every).copied().collect();
         let sequence = sequence.as_mut();
@@ -449,7 +449,7 @@ fn render_views(
         let truth = scores.truth();
         let no_classes = ClassTable::default();
         trained.labels = trained.labels.map(|l| truth.of_map(&l));
-        let registered = if slam.colour_registration().is_identity() {
+        let registered = if slam.color_registration().is_identity() {
             ""
         } else {
             "; input colour resampled to the depth camera"

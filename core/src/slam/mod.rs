@@ -30,7 +30,7 @@ use crate::{
     map::{AnchorCounts, Map, Scratch},
     mesh::MeshError,
     pose::Pose,
-    track::odometry::{ColourRegistration, Odometer, OdometryConfig, OdometryError},
+    track::odometry::{ColorRegistration, Odometer, OdometryConfig, OdometryError},
 };
 use alloc::{borrow::Cow, boxed::Box, format, string::String, vec::Vec};
 use core::{future::Future, pin::Pin};
@@ -164,9 +164,9 @@ pub struct Slam {
     scratch: Option<Scratch>,
     odometer: Odometer,
     /// Where the colours of the stored images have been found to lie.
-    registration: ColourRegistration,
+    registration: ColorRegistration,
     /// The changes of `registration`: from which frame on it was in force.
-    registrations: Vec<(usize, ColourRegistration)>,
+    registrations: Vec<(usize, ColorRegistration)>,
     frames: Vec<PoseEstimate>,
     /// [`Frame::content_hash`] of each frame.
     hashes: Vec<u64>,
@@ -214,7 +214,7 @@ impl Slam {
             map: None,
             scratch: None,
             odometer: Odometer::new(OdometryConfig::default()),
-            registration: ColourRegistration::default(),
+            registration: ColorRegistration::default(),
             registrations: Vec::new(),
             frames: Vec::new(),
             hashes: Vec::new(),
@@ -292,7 +292,7 @@ impl Slam {
     /// Where the map takes the colour image to lie on the depth image: what the odometry has found,
     /// the identity as long as nothing speaks against it (and with true poses, where no odometry
     /// runs).
-    pub fn colour_registration(&self) -> ColourRegistration {
+    pub fn color_registration(&self) -> ColorRegistration {
         self.registration
     }
 
@@ -307,13 +307,13 @@ impl Slam {
     /// back, resampled and stored again. What the map has already learnt from them fades as later
     /// iterations draw from the corrected images.
     pub(super) async fn follow_registration(&mut self, frame: usize) -> Result<(), SlamError> {
-        let found = self.odometer.colour_registration();
+        let found = self.odometer.color_registration();
         if found == self.registration {
             return Ok(());
         }
         self.registrations.push((frame, found));
         // The stored images have the former registration applied.
-        let change = ColourRegistration { scale: found.scale / self.registration.scale };
+        let change = ColorRegistration { scale: found.scale / self.registration.scale };
         self.registration = found;
         let camera = self.info.camera;
         let slots: Vec<u32> = self.keyframes.iter().map(|k| k.slot).collect();

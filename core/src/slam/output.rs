@@ -143,7 +143,7 @@ impl Slam {
         let mut seen = Visibility::new(&mesh);
         for (i, o) in self.observations.iter().enumerate() {
             let Some(f) = self.frames.get(o.frame) else { continue };
-            let view = mesh::View {
+            let view = mesh::CullingView {
                 camera: &camera,
                 world_from_camera: f.world_from_camera,
                 depth: &o.depth,

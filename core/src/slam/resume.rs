@@ -11,7 +11,7 @@ use crate::{
     frame::{Frame, SequenceInfo},
     keyframe::Keyframe,
     map::{FrameFormat, Map, Scratch, color_words},
-    track::odometry::{ColourRegistration, OdometryConfig, Rebuild, since},
+    track::odometry::{ColorRegistration, OdometryConfig, Rebuild, since},
 };
 use alloc::{collections::BTreeSet, format, string::String, vec::Vec};
 use serde::Serialize;
@@ -121,7 +121,7 @@ impl Resuming {
             let mut before = first;
             for (_, found) in later {
                 let image = colors.unwrap_or_else(|| color_words(&stored));
-                let change = ColourRegistration { scale: found.scale / before.scale };
+                let change = ColorRegistration { scale: found.scale / before.scale };
                 colors = Some(change.resampled(&image, &camera));
                 before = *found;
             }

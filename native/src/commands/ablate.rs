@@ -353,7 +353,7 @@ fn run_one(
     let estimates = slam.trajectory();
     let truth: Vec<_> = estimates.iter().map(|e| sequence.truth(e.frame)).collect();
 
-    let mut scores = ViewScores::new(&info, class_truth, slam.colour_registration());
+    let mut scores = ViewScores::new(&info, class_truth, slam.color_registration());
     let views = estimates.iter().step_by(planned.key.render_every);
     for (i, estimate) in views.enumerate() {
         let (frame, mut view) = pipeline::render_frame(&mut slam, sequence, estimate)?;

@@ -1,8 +1,15 @@
 //! An office: desks with screens to the north and west, a whiteboard and a couch to the south,
 //! shelves and the door to the east, a meeting table in the middle.
-use super::*;
-use crate::{scene::shell, shape::Primitive, trajectory::Waypoint};
+use crate::{
+    builder::{Builder, pitch, shell},
+    classes::Kind,
+    furniture::*,
+    shape::Primitive,
+    texture::Pattern,
+    trajectory::Waypoint,
+};
 use alloc::{vec, vec::Vec};
+use glam::Vec3;
 
 /// A desk with screens, a keyboard and what lies about.
 fn workplace(b: &mut Builder, top: u16, metal: u16, screens: usize) {
@@ -21,7 +28,7 @@ fn workplace(b: &mut Builder, top: u16, metal: u16, screens: usize) {
     book_stack(b, [-0.56, -0.10, 0.735], 4);
 }
 
-/// Build it; returns the shell and the camera's way points.
+/// Builds it; returns the shell and the camera's way points.
 pub fn build(b: &mut Builder) -> (Primitive, Vec<Waypoint>) {
     let size = [5.4, 4.4, 2.7];
     let (x, y, h) = (2.7, 2.2, 2.7);

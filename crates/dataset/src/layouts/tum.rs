@@ -1,5 +1,6 @@
 //! TUM RGB-D: lists of time-stamped files, associated by time.
-use super::{
+use super::interface::{LayoutFiles, Mark, Parts};
+use crate::{
     entries::{Entries, Entry},
     folder::{Folder, invalid, parse_numbers, plural, shortened},
     intrinsics::{self, Distortion, Intrinsics},
@@ -17,8 +18,33 @@ const CAMERAS: [(&str, [f64; 4], Distortion); 3] = [
     ("freiburg3", [535.4, 539.2, 320.1, 247.6], [0.0; 5]),
 ];
 
+pub(super) struct Tum;
+
+impl LayoutFiles for Tum {
+    fn name(&self) -> &'static str {
+        "tum"
+    }
+
+    fn parts(&self) -> Parts {
+        Parts {
+            color: "`rgb.txt`",
+            depth: "`depth.txt`, 1/5000 m",
+            poses: "`groundtruth.txt`",
+            labels: "`semantic_class/`",
+        }
+    }
+
+    fn marks(&self, folder: &Folder, _camera_given: bool) -> Vec<Mark> {
+        ["rgb.txt", "depth.txt"].map(|file| (file, folder.has(file).into())).into()
+    }
+
+    fn read(&self, folder: &Folder, _given: Option<&Intrinsics>) -> Result<Entries, SequenceError> {
+        read(folder)
+    }
+}
+
 /// Reads the lists and the ground truth.
-pub(super) fn read(folder: &Folder) -> Result<Entries, SequenceError> {
+fn read(folder: &Folder) -> Result<Entries, SequenceError> {
     let mut warnings = Vec::new();
     let colors = file_list(folder, "rgb.txt", &mut warnings)?;
     let depths = file_list(folder, "depth.txt", &mut warnings)?;
@@ -74,7 +100,7 @@ pub(super) fn read(folder: &Folder) -> Result<Entries, SequenceError> {
     })
 }
 
-/// The camera by the folder's name; the third, which has no distortion, when it says nothing.
+/// Returns the camera by the folder's name; the third, which has no distortion, when it says nothing.
 fn known_camera(folder: &str, warnings: &mut Vec<String>) -> Intrinsics {
     let lower = folder.to_lowercase();
     // The innermost folder that names a camera counts.
@@ -103,7 +129,7 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
         .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
 }
 
-/// `stamp file` a line, sorted by stamp.
+/// `stamp file` per line, sorted by stamp.
 fn file_list(
     folder: &Folder,
     list: &str,
@@ -127,7 +153,7 @@ fn file_list(
     Ok(files)
 }
 
-/// `stamp tx ty tz qx qy qz qw` a line, sorted by stamp; poses that are not finite are `None`.
+/// `stamp tx ty tz qx qy qz qw` per line, sorted by stamp; poses that are not finite are `None`.
 fn ground_truth(folder: &Folder, file: &str) -> Result<Vec<(f64, Option<Pose>)>, SequenceError> {
     let mut poses = Vec::new();
     for (n, line) in lines(&folder.text(file)?) {

@@ -1,102 +1,95 @@
-//! The folder layouts and how they are recognised.
-use super::{folder::Folder, images, intrinsics::IMAGES_CAMERA, nerfstudio, sens};
+//! The layouts of recordings and how they are recognised.
+//!
+//! To add a layout: a file here with a type that implements [`LayoutFiles`], its `mod` line, and
+//! its line in the registry below. Names, errors and the table of the documentation follow.
+mod images;
+mod interface;
+mod nerfstudio;
+mod replica;
+mod replica_vmap;
+mod scannet;
+mod sens;
+mod seven_scenes;
+mod tum;
+
+use crate::{entries::Entries, folder::Folder, intrinsics::Intrinsics};
 use core::{fmt, str::FromStr};
+use interface::LayoutFiles;
 use mte_slam_types::sequence::SequenceError;
 
-/// How a recording's files are laid out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Layout {
-    /// Replica in the render of NICE-SLAM: `results/frame000000.jpg`, `results/depth000000.png`.
-    ReplicaNice,
-    /// Replica in the render of vMAP and SNI-SLAM: `rgb/rgb_0.png`, `depth/depth_0.png`.
-    ReplicaVmap,
-    /// TUM RGB-D: `rgb.txt`, `depth.txt`.
-    Tum,
-    /// 7-Scenes: `frame-000000.color.png`, `frame-000000.depth.png`.
-    SevenScenes,
-    /// ScanNet, exported: `color/0.jpg`, `depth/0.png`, `pose/0.txt`, `intrinsic/`.
-    ScanNet,
-    /// ScanNet, packed: one `.sens` file.
-    Sens,
-    /// nerfstudio's `transforms.json`, with depth.
-    Nerfstudio,
-    /// Any folders of colour and depth images with a camera given; taken when nothing else fits.
-    Images,
-}
-
-pub(super) const COLOR_ENDS: [&str; 3] = [".jpg", ".png", ".jpeg"];
-pub(super) const SEVEN_COLOR_ENDS: [&str; 3] = [".color.png", ".color.jpg", ".color.jpeg"];
-
-impl Layout {
-    /// All layouts.
-    pub const ALL: [Layout; 8] = [
-        Layout::ReplicaNice,
-        Layout::ReplicaVmap,
-        Layout::Tum,
-        Layout::SevenScenes,
-        Layout::ScanNet,
-        Layout::Sens,
-        Layout::Nerfstudio,
-        Layout::Images,
-    ];
-
-    /// The name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Layout::ReplicaNice => "replica",
-            Layout::ReplicaVmap => "replica-vmap",
-            Layout::Tum => "tum",
-            Layout::SevenScenes => "7scenes",
-            Layout::ScanNet => "scannet",
-            Layout::Sens => "sens",
-            Layout::Nerfstudio => "nerfstudio",
-            Layout::Images => "images",
+/// Makes [`Layout`] of lines `Variant: Type, "documentation";`.
+macro_rules! registry {
+    ($($layout:ident: $files:path, $text:literal;)+) => {
+        /// How a recording's files are laid out.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[non_exhaustive]
+        pub enum Layout {
+            $(#[doc = $text] $layout,)+
         }
-    }
 
-    /// The files that mark the layout: what they look like, and how many there are.
-    fn marks(self, folder: &Folder, camera_given: bool) -> Vec<(&'static str, usize)> {
-        match self {
-            Layout::ReplicaNice => vec![
-                ("results/frame<number>.jpg|png", folder.count("results/frame", &COLOR_ENDS)),
-                ("results/depth<number>.png", folder.count("results/depth", &[".png"])),
-            ],
-            Layout::ReplicaVmap => vec![
-                ("rgb/rgb_<number>.png|jpg", folder.count("rgb/rgb_", &COLOR_ENDS)),
-                ("depth/depth_<number>.png", folder.count("depth/depth_", &[".png"])),
-            ],
-            Layout::Tum => vec![
-                ("rgb.txt", folder.has("rgb.txt").into()),
-                ("depth.txt", folder.has("depth.txt").into()),
-            ],
-            Layout::SevenScenes => vec![
-                ("frame-<number>.color.png|jpg", folder.count("frame-", &SEVEN_COLOR_ENDS)),
-                ("frame-<number>.depth.png", folder.count("frame-", &[".depth.png"])),
-            ],
-            Layout::ScanNet => vec![
-                ("color/<number>.jpg|png", folder.count("color/", &COLOR_ENDS)),
-                ("depth/<number>.png", folder.count("depth/", &[".png"])),
-                ("pose/<number>.txt", folder.count("pose/", &[".txt"])),
-            ],
-            Layout::Sens => vec![("<name>.sens", sens::files_of(folder).len())],
-            Layout::Nerfstudio => vec![(nerfstudio::FILE, folder.has(nerfstudio::FILE).into())],
-            Layout::Images => {
-                let camera = camera_given || folder.has(IMAGES_CAMERA);
-                vec![
-                    ("color|rgb|images/<name>.jpg|png", images::colors(folder).len()),
-                    ("depth/<name>.png", images::depths(folder).len()),
-                    ("intrinsics.json (or a camera given)", camera.into()),
-                ]
+        impl Layout {
+            /// All layouts.
+            pub const ALL: [Layout; [$($text),+].len()] = [$(Layout::$layout),+];
+
+            fn files(self) -> &'static dyn LayoutFiles {
+                match self {
+                    $(Layout::$layout => &$files,)+
+                }
             }
         }
+    };
+}
+
+registry! {
+    ReplicaNice: replica::Replica, "Replica in the render of NICE-SLAM.";
+    ReplicaVmap: replica_vmap::ReplicaVmap, "Replica in the render of vMAP and SNI-SLAM.";
+    Tum: tum::Tum, "TUM RGB-D.";
+    SevenScenes: seven_scenes::SevenScenes, "7-Scenes.";
+    ScanNet: scannet::ScanNet, "ScanNet, exported.";
+    Sens: sens::Sens, "ScanNet, packed: one `.sens` file.";
+    Nerfstudio: nerfstudio::Nerfstudio, "nerfstudio's `transforms.json`, with depth.";
+    Images: images::Images, "Any folders of images with a camera; taken when nothing else fits.";
+}
+
+impl Layout {
+    /// Returns the name on the command line.
+    pub fn name(self) -> &'static str {
+        self.files().name()
+    }
+
+    /// Returns the names of all layouts, separated by commas.
+    pub fn names() -> String {
+        Layout::ALL.map(Layout::name).join(", ")
+    }
+
+    /// Returns a table of all layouts in Markdown: where each has its parts.
+    pub fn table() -> String {
+        let mut table = String::from(
+            "| layout | colour | depth | poses | labels |\n| --- | --- | --- | --- | --- |\n",
+        );
+        for layout in Layout::ALL {
+            let parts = layout.files().parts();
+            let cells = [parts.color, parts.depth, parts.poses, parts.labels].join(" | ");
+            table += &format!("| `{layout}` | {cells} |\n");
+        }
+        table
+    }
+
+    /// Reads everything but the images.
+    pub(super) fn read(
+        self,
+        folder: &Folder,
+        given: Option<Intrinsics>,
+    ) -> Result<Entries, SequenceError> {
+        self.files().read(folder, given.as_ref())?.completed(folder, given)
     }
 
     fn fits(self, folder: &Folder, camera_given: bool) -> bool {
-        self.marks(folder, camera_given).iter().all(|(_, n)| *n > 0)
+        self.files().marks(folder, camera_given).iter().all(|(_, n)| *n > 0)
     }
 
     fn report(self, folder: &Folder, camera_given: bool) -> String {
-        let marks = self.marks(folder, camera_given);
+        let marks = self.files().marks(folder, camera_given);
         let marks: Vec<String> = marks.iter().map(|(m, n)| format!("{m} (found {n})")).collect();
         format!("{self} needs {}", marks.join(" and "))
     }
@@ -117,9 +110,8 @@ impl Layout {
             };
             let mut fitting: Vec<Layout> =
                 candidates.iter().copied().filter(|l| l.fits(folder, camera_given)).collect();
-            // Most recordings with a list or poses of their own are such folders, too.
             if fitting.len() > 1 {
-                fitting.retain(|l| *l != Layout::Images);
+                fitting.retain(|l| !l.files().is_last_resort());
             }
             match fitting.as_slice() {
                 [one] => return Ok(*one),
@@ -158,10 +150,8 @@ impl FromStr for Layout {
 
     /// From the name on the command line; the error lists the names.
     fn from_str(s: &str) -> Result<Self, String> {
-        Layout::ALL.into_iter().find(|l| l.name() == s).ok_or_else(|| {
-            let names: Vec<&str> = Layout::ALL.iter().map(|l| l.name()).collect();
-            format!("no layout {s:?}; there are {}", names.join(", "))
-        })
+        let named = Layout::ALL.into_iter().find(|l| l.name() == s);
+        named.ok_or_else(|| format!("no layout {s:?}; there are {}", Layout::names()))
     }
 }
 
@@ -183,7 +173,14 @@ mod tests {
         for layout in Layout::ALL {
             assert_eq!(layout.to_string().parse(), Ok(layout));
         }
+        assert!(Layout::names().starts_with("replica, replica-vmap, tum, 7scenes, scannet"));
         assert!("scanet".parse::<Layout>().unwrap_err().contains("7scenes"));
+    }
+
+    #[test]
+    fn the_documentation_lists_every_layout() {
+        let shown = include_str!("../layouts.md");
+        assert_eq!(shown, Layout::table(), "crates/dataset/src/layouts.md is not the table");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! ScanNet's packed recordings (`.sens`, version 4). Only the frames' headers are read at opening;
 //! images are read one by one later, so that memory does not grow with the file.
-use super::{
+use super::interface::{LayoutFiles, Mark, Parts};
+use crate::{
     decode::Origin,
     entries::{Entries, Entry},
     folder::{Folder, invalid},
@@ -18,8 +19,33 @@ const MAX_IMAGE_BYTES: u64 = 256 << 20;
 /// More frames than any recording has (9 hours at 30 Hz).
 const MAX_FRAMES: u64 = 1 << 20;
 
-/// The `.sens` files of a folder.
-pub(super) fn files_of(folder: &Folder) -> Vec<&str> {
+pub(super) struct Sens;
+
+impl LayoutFiles for Sens {
+    fn name(&self) -> &'static str {
+        "sens"
+    }
+
+    fn parts(&self) -> Parts {
+        Parts {
+            color: "in `NAME.sens`",
+            depth: "there, in its unit",
+            poses: "there",
+            labels: "`label-filt/0.png`",
+        }
+    }
+
+    fn marks(&self, folder: &Folder, _camera_given: bool) -> Vec<Mark> {
+        vec![("<name>.sens", files_of(folder).len())]
+    }
+
+    fn read(&self, folder: &Folder, _given: Option<&Intrinsics>) -> Result<Entries, SequenceError> {
+        read(folder)
+    }
+}
+
+/// Returns the `.sens` files of a folder.
+fn files_of(folder: &Folder) -> Vec<&str> {
     folder.names().filter(|n| n.ends_with(".sens") && !n.contains('/')).collect()
 }
 
@@ -89,7 +115,7 @@ impl Fields<'_> {
 }
 
 /// Reads everything but the images.
-pub(super) fn read(folder: &Folder) -> Result<Entries, SequenceError> {
+fn read(folder: &Folder) -> Result<Entries, SequenceError> {
     let files = files_of(folder);
     let &[file] = files.as_slice() else {
         let expected = "one .sens file in the folder; give the path of the one that is meant";
@@ -217,7 +243,7 @@ pub(super) fn read(folder: &Folder) -> Result<Entries, SequenceError> {
     })
 }
 
-/// Whether a matrix is the identity, or not given (all zero).
+/// Returns whether a matrix is the identity, or not given (all zero).
 fn is_identity(m: &[f64; 16]) -> bool {
     let near = |scale: f64| {
         m.iter().enumerate().all(|(i, x)| {

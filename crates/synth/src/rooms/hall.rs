@@ -1,10 +1,17 @@
 //! A hall of 10 x 9 x 8 m: high windows to the north and south, a gallery on columns to the west,
 //! tables, sofas and bookcases below. The camera flies, or it would see little of what is high up.
-use super::*;
-use crate::{scene::shell, shape::Primitive, trajectory::Waypoint};
+use crate::{
+    builder::{Builder, shell},
+    classes::Kind,
+    furniture::*,
+    shape::Primitive,
+    texture::Pattern,
+    trajectory::Waypoint,
+};
 use alloc::{vec, vec::Vec};
+use glam::Vec3;
 
-/// Build it; returns the shell and the camera's way points.
+/// Builds it; returns the shell and the camera's way points.
 pub fn build(b: &mut Builder) -> (Primitive, Vec<Waypoint>) {
     let (x, y, h) = (5.0, 4.5, 8.0);
     let paper = b.rng.pick(&[

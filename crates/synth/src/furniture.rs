@@ -1,18 +1,14 @@
 //! Furniture, each piece relative to the builder's placement: x to the right, y to the back
 //! (towards the wall), z up, the origin on the floor under the middle unless said otherwise.
-#[cfg(feature = "hall")]
-pub mod hall;
-pub mod office;
-pub mod room;
-
 use super::{
+    builder::{Builder, bulb, pitch, yaw},
+    classes::Kind,
     light::Light,
-    scene::{Builder, Kind, pitch, yaw},
     texture::Pattern,
 };
 use glam::{Mat3, Vec3};
 
-const BLACK: [u8; 3] = [30, 30, 34];
+pub const BLACK: [u8; 3] = [30, 30, 34];
 const STEEL: [u8; 3] = [150, 154, 160];
 
 /// Cloth and paper covers of books.
@@ -33,7 +29,7 @@ const COVERS: [[u8; 3]; 14] = [
     [170, 92, 96],
 ];
 
-/// A colour close to `color`.
+/// Returns a colour close to `color`.
 fn tint(b: &mut Builder, color: [u8; 3]) -> [u8; 3] {
     color.map(|c| (f32::from(c) * b.rng.range(0.85, 1.2)) as u8)
 }
@@ -263,7 +259,7 @@ pub fn pendant(b: &mut Builder, height: f32, drop: f32, power: Vec3) {
     b.cone(Kind::lamp, metal, [0.0, 0.0, height - drop], [0.008, 0.008], drop - 0.0301);
     b.cone(Kind::lamp, shade, [0.0, 0.0, height - drop - 0.16], [0.24, 0.10], 0.17);
     let centre = b.world([0.0, 0.0, height - drop - 0.1]);
-    b.lights.push(super::scene::bulb(centre, 0.40, power));
+    b.lights.push(bulb(centre, 0.40, power));
 }
 
 /// A vase.

@@ -1,9 +1,9 @@
 //! A plain folder of colour and depth images whose camera is given.
-use super::{
+use super::interface::{LayoutFiles, Mark, Parts};
+use crate::{
     entries::{Entries, Entry, trajectory},
-    folder::{Folder, invalid, parse_matrix, plural},
-    intrinsics::{self, Intrinsics},
-    layout::COLOR_ENDS,
+    folder::{COLOR_ENDS, Folder, base, invalid, last_number, numbers, parse_matrix, plural},
+    intrinsics::{self, IMAGES_CAMERA, Intrinsics},
 };
 use mte_slam_types::{pose::Pose, sequence::SequenceError};
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,13 +13,48 @@ const DEPTH_FOLDERS: [&str; 2] = ["depth", "depths"];
 const POSE_FOLDERS: [&str; 2] = ["pose", "poses"];
 const POSE_FILES: [&str; 4] = ["traj.txt", "traj_w_c.txt", "poses.txt", "trajectory.txt"];
 
+pub(super) struct Images;
+
+impl LayoutFiles for Images {
+    fn name(&self) -> &'static str {
+        "images"
+    }
+
+    fn parts(&self) -> Parts {
+        Parts {
+            color: "`color/*`, `rgb/*`, `images/*`",
+            depth: "`depth/*.png`, mm unless the camera says",
+            poses: "`pose/0.txt`, `traj.txt`, `poses.txt`",
+            labels: "`semantic_class/`",
+        }
+    }
+
+    fn marks(&self, folder: &Folder, camera_given: bool) -> Vec<Mark> {
+        let camera = camera_given || folder.has(IMAGES_CAMERA);
+        vec![
+            ("color|rgb|images/<name>.jpg|png", colors(folder).len()),
+            ("depth/<name>.png", depths(folder).len()),
+            ("intrinsics.json (or a camera given)", camera.into()),
+        ]
+    }
+
+    fn read(&self, folder: &Folder, given: Option<&Intrinsics>) -> Result<Entries, SequenceError> {
+        read(folder, given.cloned())
+    }
+
+    /// Most recordings with a list or poses of their own are such folders, too.
+    fn is_last_resort(&self) -> bool {
+        true
+    }
+}
+
 /// Colour images, in the order of the numbers in their names.
-pub(super) fn colors(folder: &Folder) -> Vec<&str> {
+fn colors(folder: &Folder) -> Vec<&str> {
     listed(folder, &COLOR_FOLDERS, &COLOR_ENDS)
 }
 
-/// Depth images, likewise.
-pub(super) fn depths(folder: &Folder) -> Vec<&str> {
+/// Returns depth images, likewise.
+fn depths(folder: &Folder) -> Vec<&str> {
     listed(folder, &DEPTH_FOLDERS, &[".png"])
 }
 
@@ -43,7 +78,7 @@ fn listed<'a>(folder: &'a Folder, folders: &[&str], ends: &[&str]) -> Vec<&'a st
 }
 
 /// Reads everything but the images.
-pub(super) fn read(folder: &Folder, given: Option<Intrinsics>) -> Result<Entries, SequenceError> {
+fn read(folder: &Folder, given: Option<Intrinsics>) -> Result<Entries, SequenceError> {
     let mut warnings = Vec::new();
     let pairs = paired(folder, &mut warnings)?;
     let distinct: BTreeSet<u64> = pairs.iter().filter_map(|(c, _)| last_number(c)).collect();
@@ -115,7 +150,7 @@ fn paired<'a>(
     Ok(colors.into_iter().zip(depths).collect())
 }
 
-/// A file a frame in `pose/`, or a line a frame.
+/// Reads one file per frame in `pose/`, or one line per frame.
 fn poses(folder: &Folder, frames: &[u64]) -> Result<Vec<Option<Pose>>, SequenceError> {
     for below in POSE_FOLDERS {
         let files = folder.numbered(&format!("{below}/"), &[".txt"])?;
@@ -132,21 +167,4 @@ fn poses(folder: &Folder, frames: &[u64]) -> Result<Vec<Option<Pose>>, SequenceE
         Some(file) => trajectory(folder, file, frames),
         None => Ok(vec![None; frames.len()]),
     }
-}
-
-/// The last part of a path.
-fn base(name: &str) -> &str {
-    name.rsplit('/').next().unwrap_or(name)
-}
-
-/// All numbers in a name; digits beyond what a u64 holds are cut off.
-fn numbers(name: &str) -> Vec<u64> {
-    let runs = name.split(|c: char| !c.is_ascii_digit()).filter(|r| !r.is_empty());
-    runs.map(|r| r.parse().unwrap_or(u64::MAX)).collect()
-}
-
-/// The last number in a file's name.
-pub(super) fn last_number(name: &str) -> Option<u64> {
-    let stem = base(name);
-    numbers(stem.rsplit_once('.').map_or(stem, |(s, _)| s)).last().copied()
 }

@@ -1,10 +1,17 @@
 //! A living room: sofa and pictures to the west, window and desk to the north, bookcase and door
 //! to the east, sideboard to the south, a dining table on a rug in the middle.
-use super::*;
-use crate::{scene::shell, shape::Primitive, trajectory::Waypoint};
+use crate::{
+    builder::{Builder, shell},
+    classes::Kind,
+    furniture::*,
+    shape::Primitive,
+    texture::Pattern,
+    trajectory::Waypoint,
+};
 use alloc::{vec, vec::Vec};
+use glam::{Mat3, Vec3};
 
-/// Build it; returns the shell and the camera's way points.
+/// Builds it; returns the shell and the camera's way points.
 pub fn build(b: &mut Builder) -> (Primitive, Vec<Waypoint>) {
     let size = [5.0, 4.5, 2.6];
     let (x, y, h) = (2.5, 2.25, 2.6);

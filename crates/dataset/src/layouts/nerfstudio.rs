@@ -1,19 +1,18 @@
 //! nerfstudio's `transforms.json` with depth, also in the variants of Instant-NGP and NeRFCapture.
 //! Its cameras look along -z with y up (OpenGL), and its pixel (0, 0) has its centre at (1/2, 1/2);
 //! both become ours here.
-use super::{
+use super::interface::{LayoutFiles, Mark, Parts};
+use crate::{
     entries::{Entries, Entry},
-    folder::{Folder, invalid, plural, shortened},
-    images::last_number,
+    folder::{COLOR_ENDS, Folder, invalid, last_number, plural, shortened},
     intrinsics::{Intrinsics, checked},
-    layout::COLOR_ENDS,
 };
 use mte_slam_types::{pose::Pose, sequence::SequenceError};
 use serde_json::Value;
 use std::collections::BTreeSet;
 
 /// The file that makes a folder one of nerfstudio's.
-pub(super) const FILE: &str = "transforms.json";
+const FILE: &str = "transforms.json";
 /// Metres per unit of depth where the file says nothing, as in nerfstudio's own parser.
 const DEPTH_UNIT_M: f64 = 1e-3;
 /// The camera models that are a pinhole with (or without) the distortion that we know.
@@ -22,8 +21,33 @@ const MODELS: [&str; 6] =
 /// What belongs to a camera, at the top or in every frame.
 const CAMERA_KEYS: [&str; 6] = ["fl_x", "fl_y", "cx", "cy", "w", "h"];
 
+pub(super) struct Nerfstudio;
+
+impl LayoutFiles for Nerfstudio {
+    fn name(&self) -> &'static str {
+        "nerfstudio"
+    }
+
+    fn parts(&self) -> Parts {
+        Parts {
+            color: "`transforms.json`",
+            depth: "there, mm unless it says",
+            poses: "there (OpenGL axes)",
+            labels: "`semantic_class/`",
+        }
+    }
+
+    fn marks(&self, folder: &Folder, _camera_given: bool) -> Vec<Mark> {
+        vec![(FILE, folder.has(FILE).into())]
+    }
+
+    fn read(&self, folder: &Folder, _given: Option<&Intrinsics>) -> Result<Entries, SequenceError> {
+        read(folder)
+    }
+}
+
 /// Reads everything but the images.
-pub(super) fn read(folder: &Folder) -> Result<Entries, SequenceError> {
+fn read(folder: &Folder) -> Result<Entries, SequenceError> {
     let mut warnings = Vec::new();
     let json = folder.json(FILE)?;
     let listed = json.get("frames").and_then(Value::as_array).ok_or_else(|| {
@@ -107,7 +131,7 @@ fn in_order(frames: &mut [Entry], warnings: &mut Vec<String>) {
     }
 }
 
-/// The camera, of the colour images, from the top of the file or else from its first frame.
+/// Returns the camera, of the colour images, from the top of the file or else from its first frame.
 fn camera(json: &Value, first: &Value) -> Result<Intrinsics, SequenceError> {
     let get = |key: &str| json.get(key).or_else(|| first.get(key));
     if let Some(model) = get("camera_model").and_then(Value::as_str)
