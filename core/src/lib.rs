@@ -22,4 +22,4 @@ pub mod track;
 pub use mte_slam_mesh as mesh;
 pub use mte_slam_shaders as shaders;
 pub use mte_slam_shaders::{layout, shader};
-pub use mte_slam_types::{camera, classes, frame, hash, pose, sequence};
+pub use mte_slam_types::{camera, classes, frame, hash, pose, sequence, settings};

@@ -57,5 +57,6 @@ fn follow(cli: &Cli) -> anyhow::Result<()> {
         Command::Ablate(args) => commands::ablate::run(args, screen),
         Command::Bench(args) => commands::bench::run(args, screen),
         Command::Shaders(args) => commands::shaders::run(args, screen),
+        Command::Settings(args) => commands::settings::run(args, screen),
     }
 }

@@ -605,7 +605,7 @@ fn bad_settings_are_refused_by_name() {
         let mut c = Config::default();
         change(&mut c);
         let error = c.validate().expect_err(field);
-        assert_eq!((error.field, error.found.as_str()), (*field, *found));
+        assert_eq!((error.path(), error.found()), (*field, Some(*found)));
         assert!(error.to_string().contains(field), "{error}");
     }
     // The edges of the ranges are good.

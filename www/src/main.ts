@@ -1,5 +1,5 @@
 // The page: wires controls, engine and view together. All computing happens in workers.
-import { MteSlam, type ErrorEvent, type ExportKind, type KeptRun, type OpenedEvent, type Settings, type SourceSpec } from "./client";
+import { MteSlam, type ErrorEvent, type ExportKind, type KeptRun, type OpenedEvent, type Overrides, type Settings, type SourceSpec } from "./client";
 import { bytes, element, paint, seconds, show } from "./ui/dom";
 import { type Action, type FailureKind, fail } from "./ui/failure";
 import { type About, about, engineOf, mine, offer, sourceOf } from "./ui/kept";
@@ -188,7 +188,7 @@ function failed(kind: FailureKind, message: string, resumable: boolean): void {
 }
 
 /** What the paper adds, switched off and on where this build has it. */
-const SWITCHES: [path: string, name: string][] = [
+const SWITCHES: [path: keyof Overrides, name: string][] = [
   ["fusion.enabled", "Feature fusion (MTFF)"],
   ["suppressor.enabled", "Redundancy suppressor (FRS)"],
 ];

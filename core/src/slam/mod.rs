@@ -30,7 +30,7 @@ use crate::{
     map::{AnchorCounts, Map, Scratch},
     mesh::MeshError,
     pose::Pose,
-    track::odometry::{ColorRegistration, Odometer, OdometryConfig, OdometryError},
+    track::odometry::{ColorRegistration, Odometer, OdometryError},
 };
 use alloc::{borrow::Cow, boxed::Box, format, string::String, vec::Vec};
 use core::{future::Future, pin::Pin};
@@ -42,7 +42,7 @@ pub enum SlamError {
     #[error(transparent)]
     Engine(#[from] EngineError),
     /// The configuration is not usable.
-    #[error(transparent)]
+    #[error("configuration: {0}")]
     Config(#[from] ConfigError),
     /// Tracking could not even be tried.
     #[error(transparent)]
@@ -206,6 +206,7 @@ impl Slam {
 
     fn on_engine(engine: Engine, config: Config, info: &SequenceInfo) -> Result<Slam, SlamError> {
         config.validate()?;
+        let odometer = Odometer::new(config.odometry.clone());
         Ok(Slam {
             config,
             breathe: None,
@@ -213,7 +214,7 @@ impl Slam {
             engine,
             map: None,
             scratch: None,
-            odometer: Odometer::new(OdometryConfig::default()),
+            odometer,
             registration: ColorRegistration::default(),
             registrations: Vec::new(),
             frames: Vec::new(),

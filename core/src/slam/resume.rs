@@ -11,7 +11,7 @@ use crate::{
     frame::{Frame, SequenceInfo},
     keyframe::Keyframe,
     map::{FrameFormat, Map, Scratch, color_words},
-    track::odometry::{ColorRegistration, OdometryConfig, Rebuild, since},
+    track::odometry::{ColorRegistration, Rebuild, since},
 };
 use alloc::{collections::BTreeSet, format, string::String, vec::Vec};
 use serde::Serialize;
@@ -55,7 +55,7 @@ impl Slam {
         same("sequence", &saved.state.sequence, &named)?;
         let slam = build(engine, config, info, checkpoint, &saved)?;
         let pose_state = slam.saved_words(checkpoint, "slots.pose_state")?;
-        let odometer = Rebuild::new(OdometryConfig::default(), saved.state.odometer.clone());
+        let odometer = Rebuild::new(slam.config.odometry.clone(), saved.state.odometer.clone());
         let mut missing: BTreeSet<usize> = slam.keyframes.iter().map(|k| k.frame).collect();
         missing.extend(saved.state.odometer.frames());
         Ok(Resuming { slam, saved, odometer, missing, pose_state })

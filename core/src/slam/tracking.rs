@@ -51,7 +51,7 @@ impl Slam {
             push(&mut self.frames, frame.truth.unwrap_or(last), status);
             return Ok((status, first));
         }
-        let config = self.odometer.config().pyramid;
+        let config = self.odometer.config().pyramid.clone();
         let pyramid = RgbdPyramid::new(frame, &self.info.camera, self.info.depth_unit_m, &config)?;
         let start = first.then(|| frame.truth.unwrap_or(Pose::IDENTITY));
         let found = self.odometer.track(pyramid, start)?;
