@@ -37,7 +37,7 @@ target=$(
     for crate in core types odometry dataset mesh metrics synth; do
         set -- "$@" --config "profile.release.package.mte-slam-$crate.opt-level=2"
     done
-    for crate in mte-slam-web serde_json zip zune-jpeg image png fdeflate miniz_oxide wgpu js-sys serde-wasm-bindgen; do
+    for crate in mte-slam-web mte-slam-run serde_json zip zune-jpeg image png fdeflate miniz_oxide wgpu js-sys serde-wasm-bindgen; do
         set -- "$@" --config "profile.release.package.$crate.opt-level='s'"
     done
     cargo build --locked --release "$@" -p mte-slam-web --target wasm32-unknown-unknown >&2

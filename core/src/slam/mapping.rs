@@ -1,6 +1,6 @@
 //! Adding a frame to the map: bounds, keyframes, windows, optimisation, corrected poses.
 use super::semantics::steps_due;
-use super::{Breathe, Losses, Observation, Slam, SlamError};
+use super::{Losses, Observation, Pace, Slam, SlamError, Unpaced};
 use crate::{
     config::{RefinePoses, Tracker},
     device::{Batch, Device, Guidance, Rates, WINDOW_MAX},
@@ -81,6 +81,7 @@ impl Slam {
         &mut self,
         frame: &Frame,
         reference: bool,
+        pace: &mut dyn Pace,
     ) -> Result<(Losses, bool), SlamError> {
         let Some(pose) = self.frames.last().map(|f| f.world_from_camera) else {
             return Err(SlamError::NoMap);
@@ -134,6 +135,7 @@ impl Slam {
             .optimise(
                 &near,
                 Pass { iterations, rates, recent: RECENT, fusion_steps: steps, semantic: false },
+                pace,
             )
             .await?;
         self.mapping_calls += 1;
@@ -163,6 +165,14 @@ impl Slam {
     /// # Errors
     /// Engine failures.
     pub async fn finish_step(&mut self) -> Result<bool, SlamError> {
+        self.finish_step_with(&mut Unpaced).await
+    }
+
+    /// [`Slam::finish_step`] with the event loop of the program around it.
+    ///
+    /// # Errors
+    /// Engine failures.
+    pub async fn finish_step_with(&mut self, pace: &mut dyn Pace) -> Result<bool, SlamError> {
         let mut done = self.finished_iterations;
         let mut current = None;
         for (part, total) in self.finish_parts() {
@@ -184,7 +194,7 @@ impl Slam {
         let iterations = (total - done).min(FINISH_ITERATIONS);
         let left = f64::from(total - done) / f64::from(total);
         if part == Part::Anchors {
-            self.settle_anchors(iterations, left, done == 0).await?;
+            self.settle_anchors(iterations, left, done == 0, pace).await?;
         } else {
             let (m, f) = (&self.config.mapping, &self.config.fusion);
             let semantic = part == Part::Semantics;
@@ -198,7 +208,7 @@ impl Slam {
             };
             let all: Vec<usize> = (0..self.keyframes.len()).collect();
             let pass = Pass { iterations, rates, recent: 0, fusion_steps, semantic };
-            self.optimise(&all, pass).await?;
+            self.optimise(&all, pass, pace).await?;
         }
         self.finished_iterations += iterations;
         let more = self.finished_iterations < self.finish_iterations();
@@ -229,10 +239,11 @@ impl Slam {
         iterations: u32,
         left: f64,
         first: bool,
+        pace: &mut dyn Pace,
     ) -> Result<(), SlamError> {
         let (m, s) = (self.config.mapping.clone(), self.config.sampling.clone());
         let loss = self.config.loss.clone();
-        let (seed, breathe) = (self.config.seed, self.breathe);
+        let seed = self.config.seed;
         let keyframes: Vec<_> =
             self.keyframes.iter().map(|k| (k.slot, k.world_from_camera)).collect();
         let last_frame = self.keyframes.last().map_or(0, |k| k.frame);
@@ -266,7 +277,7 @@ impl Slam {
             };
             device.record_forward(&mut r, &batch);
             device.record_anchor_settling(&mut r, &batch, SETTLE_RATE * left, first && i == 0);
-            submit_when_due(device, &mut r, i + 1, iterations, breathe).await?;
+            submit_when_due(device, &mut r, i + 1, iterations, pace).await?;
         }
         let counts = device.read_anchor_counts().await?;
         self.anchor_history.extend(counts.map(|c| (last_frame, c)));
@@ -344,9 +355,13 @@ impl Slam {
 
     /// Optimises map and poses over windows of the `recent` last keyframes (the current frame
     /// among them) and others drawn from the keyframes `near`.
-    async fn optimise(&mut self, near: &[usize], pass: Pass) -> Result<Losses, SlamError> {
+    async fn optimise(
+        &mut self,
+        near: &[usize],
+        pass: Pass,
+        pace: &mut dyn Pace,
+    ) -> Result<Losses, SlamError> {
         let Pass { iterations, rates, recent, fusion_steps, semantic } = pass;
-        let breathe = self.breathe;
         let m = self.config.mapping.clone();
         let s = self.config.sampling.clone();
         let mut loss = self.config.loss.clone();
@@ -448,7 +463,7 @@ impl Slam {
                 }
                 device.record_step(&mut r, &batch, rates);
             }
-            submit_when_due(device, &mut r, i + 1, iterations, breathe).await?;
+            submit_when_due(device, &mut r, i + 1, iterations, pace).await?;
         }
         let losses = read_losses(device, rays, &loss).await?;
         if device.read_status().await? & crate::kernels::adam::STATUS_NOT_FINITE != 0 {
@@ -477,15 +492,15 @@ async fn submit_when_due(
     r: &mut Recording,
     done: u32,
     iterations: u32,
-    breathe: Option<Breathe>,
+    pace: &mut dyn Pace,
 ) -> Result<(), SlamError> {
     if !done.is_multiple_of(ITERATIONS_PER_RECORDING) && done != iterations {
         return Ok(());
     }
     device.engine.submit(&core::mem::take(r))?;
-    if let Some(breathe) = breathe {
+    if pace.has_event_loop() {
         device.engine.synchronise().await?;
-        breathe(done, iterations).await;
+        pace.turn(done, iterations).await;
     }
     Ok(())
 }
