@@ -9,8 +9,9 @@ use crate::{
 use mte_slam_core::{
     config::{Config, Tracker},
     engine::{Engine, EngineError},
-    slam::{Slam, SlamError},
+    slam::SlamError,
 };
+use mte_slam_run::{Run, RunError};
 use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
 use mte_slam_types::{pose::Pose, sequence::Sequence};
 
@@ -93,19 +94,17 @@ pub async fn short_run(engine: Engine) -> Result<Vec<Pose>, SlamError> {
     // Steps cut short would end wherever rounding sent them.
     config.tracking.render_rays = 1024;
     config.tracking.render_iterations = 12;
-    let info = sequence.info().clone();
-    let mut slam = Slam::new(engine, config, &info).await?;
-    for index in 0..info.frames {
-        let frame = sequence.frame(index).map_err(|e| SlamError::Frame {
+    let mut run = Run::new(engine, config, sequence.info()).await?;
+    run.to_end(&mut sequence, &mut ()).await.map_err(|error| match error {
+        RunError::Input { index, error } => SlamError::Frame {
             frame: index,
             field: "built-in sequence",
-            found: e.to_string(),
+            found: error.to_string(),
             expected: "a frame".into(),
-        })?;
-        slam.process(&frame).await?;
-    }
-    slam.finish().await?;
-    Ok(slam.trajectory().iter().map(|p| p.world_from_camera).collect())
+        },
+        RunError::Frame { error, .. } | RunError::Finish(error) | RunError::Resume(error) => error,
+    })?;
+    Ok(run.slam().trajectory().iter().map(|p| p.world_from_camera).collect())
 }
 
 /// Largest distance between the positions of two runs \[m\]; infinite for unequal lengths.

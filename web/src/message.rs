@@ -309,7 +309,7 @@ pub struct TrajectoryEvent {
 }
 
 /// Of [`Event::Metrics`].
-#[derive(Clone, Debug, Serialize, Deserialize, Tsify)]
+#[derive(Clone, Debug, Serialize, Tsify)]
 #[serde(rename_all = "camelCase")]
 pub struct MetricsEvent {
     /// Frame.
@@ -335,7 +335,7 @@ pub struct MetricsEvent {
 }
 
 /// Mean losses, weighted as optimised.
-#[derive(Clone, Debug, Serialize, Deserialize, Tsify)]
+#[derive(Clone, Debug, Serialize, Tsify)]
 pub struct LossFigures {
     /// Sum of the others.
     pub total: f64,

@@ -7,9 +7,7 @@ mod presets;
 mod semantics;
 
 pub use crate::settings::ConfigError;
-pub use semantics::{
-    AnchorRule, FusionConfig, Head, Inference, SemanticsConfig, SuppressorConfig,
-};
+pub use semantics::{AnchorRule, FusionConfig, Head, Inference, SemanticsConfig, SuppressorConfig};
 
 use crate::settings::{self, Entry, Value};
 use alloc::vec::Vec;

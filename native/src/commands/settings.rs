@@ -7,11 +7,7 @@ use std::fmt::Write;
 /// Prints every setting, or those that match.
 pub fn run(args: &SettingsArgs, screen: Screen) -> Result<()> {
     let Some(config) = Config::preset(&args.preset) else {
-        usage!(
-            "--preset: found `{}`, expected one of {}",
-            args.preset,
-            Config::PRESETS.join(", ")
-        );
+        usage!("--preset: found `{}`, expected one of {}", args.preset, Config::PRESETS.join(", "));
     };
     let lines = guide::plain(&config, &args.word);
     if lines.is_empty() && !args.word.is_empty() {

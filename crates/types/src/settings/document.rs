@@ -54,8 +54,7 @@ impl Documentation {
 
     /// Adds a setting's text and returns its path.
     pub fn setting(&mut self, section: &str, name: &str, lines: &[&str]) -> String {
-        let path =
-            if section.is_empty() { name.to_string() } else { format!("{section}.{name}") };
+        let path = if section.is_empty() { name.to_string() } else { format!("{section}.{name}") };
         self.settings.insert(path.clone(), text(lines));
         path
     }

@@ -187,7 +187,10 @@ impl Kind {
             Kind::Number => number("number", ""),
             Kind::Choice(names) => format!("string, {}", alternatives(names)),
             Kind::Integers(n) => {
-                format!("array of {n} integers, each {}", number("", "0 to 4294967295").trim_start_matches(", "))
+                format!(
+                    "array of {n} integers, each {}",
+                    number("", "0 to 4294967295").trim_start_matches(", ")
+                )
             }
         }
     }

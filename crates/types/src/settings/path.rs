@@ -1,7 +1,5 @@
 //! Settings by their dotted paths, such as `tracking.render_loss.depth`.
-use super::{
-    Choice, ConfigError, Field, Kind, Range, Section, Slot, SlotMut, Value, alternatives,
-};
+use super::{Choice, ConfigError, Field, Kind, Range, Section, Slot, SlotMut, Value, alternatives};
 use alloc::{
     borrow::ToOwned,
     format,
@@ -265,8 +263,7 @@ fn similar(section: &dyn Section, path: &str) -> Vec<String> {
     let wanted = last(path);
     let mut near = Vec::new();
     let _ = walk::<()>(section, "", &mut |key, _, _| {
-        let distance =
-            edit_distance(&key, path).min(1 + edit_distance(&last(&key), &wanted));
+        let distance = edit_distance(&key, path).min(1 + edit_distance(&last(&key), &wanted));
         if distance <= 1 + wanted.len() / 3 {
             near.push((distance, key));
         }

@@ -95,7 +95,11 @@ fn what_is_wrong_is_an_error_of_its_type_and_changes_nothing() {
         ("windows", "true", "windows: found boolean true, expected integer, 1, 2 or 4"),
         ("lamp.on", "1", "lamp.on: found integer 1, expected boolean, true or false"),
         ("lamp.light", "1", "lamp.light: found integer 1, expected string, warm or cold"),
-        ("lamp.place", "[1]", "lamp.place: found array [1], expected array of 2 integers, each 0 to 9"),
+        (
+            "lamp.place",
+            "[1]",
+            "lamp.place: found array [1], expected array of 2 integers, each 0 to 9",
+        ),
         (
             "lamp",
             "1",
@@ -163,7 +167,8 @@ fn declarations_carry_units_and_texts() {
 
 #[test]
 fn distances_count_letters() {
-    for (a, b, n) in [("", "abc", 3), ("abc", "abc", 0), ("abc", "ac", 1), ("kitten", "sitting", 3)] {
+    for (a, b, n) in [("", "abc", 3), ("abc", "abc", 0), ("abc", "ac", 1), ("kitten", "sitting", 3)]
+    {
         assert_eq!((edit_distance(a, b), edit_distance(b, a)), (n, n));
     }
 }
