@@ -46,9 +46,6 @@ pub struct Settings {
     /// Which engine computes.
     #[tsify(optional)]
     pub engine: EngineChoice,
-    /// Unrolled shaders: fast on hardware, slow to compile on software adapters.
-    #[tsify(optional)]
-    pub unroll: bool,
     /// `align`, `render` or `truth`; the preset's by default.
     #[tsify(optional, type = "Overrides[\"tracking.tracker\"]")]
     pub tracker: Option<String>,
@@ -86,7 +83,6 @@ impl Default for Settings {
         Settings {
             preset: "fast".into(),
             engine: EngineChoice::Auto,
-            unroll: true,
             tracker: None,
             labels: LabelChoice::Dataset,
             start: 0,

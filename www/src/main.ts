@@ -53,7 +53,6 @@ let awaited: KeptRun | undefined;
 let given: SourceSpec | undefined;
 let hasGpu = false;
 let gpuName = "";
-let software = false;
 
 // --- Running ---------------------------------------------------------------------------------
 
@@ -116,7 +115,7 @@ async function open(source: SourceSpec, choice: state.Choice, id?: string, start
   transport();
   progress();
   status("Opening the recording");
-  const settings: Settings = { unroll: !software, ...choice.settings };
+  const settings: Settings = { ...choice.settings };
   const keep = { id: run.id, about: about(source, choice), resume: id !== undefined };
   if (await slam.open(source, settings, keep)) {
     run.begunAt = performance.now();
@@ -533,7 +532,7 @@ document.addEventListener("visibilitychange", () => {
   if (!document.hidden && run.running) note("Mapping went on while this tab was hidden, as far as the browser lets it.");
 });
 
-/** What this browser can compute with; software adapters get shaders without unrolled loops. */
+/** What this browser can compute with. */
 async function lookForGpu(): Promise<void> {
   const place = element("gpu-note");
   try {
@@ -542,7 +541,7 @@ async function lookForGpu(): Promise<void> {
     hasGpu = adapter !== null && adapter !== undefined;
     const name = about?.description || [about?.vendor, about?.architecture].filter(Boolean).join(" ");
     gpuName = name;
-    software = /swiftshader|llvmpipe|software/i.test(name) || about?.isFallbackAdapter === true;
+    const software = /swiftshader|llvmpipe|software/i.test(name) || about?.isFallbackAdapter === true;
     place.textContent = !hasGpu
       ? "No WebGPU here: the processor computes, so choose Tiny and small images."
       : software

@@ -12,7 +12,7 @@ use crate::{
     hash::Hasher,
     map::{AnchorCounts, Counters},
     pose::Pose,
-    track::odometry::{ColourRegistration, OdometerState},
+    track::odometry::{ColorRegistration, OdometerState},
 };
 use alloc::{
     collections::BTreeMap,
@@ -141,7 +141,7 @@ pub(super) struct State {
     pub keyframes: Vec<SavedKeyframe>,
     pub observed_frames: Vec<usize>,
     pub anchor_history: Vec<(usize, AnchorCounts)>,
-    pub registrations: Vec<(usize, ColourRegistration)>,
+    pub registrations: Vec<(usize, ColorRegistration)>,
     pub odometer: OdometerState,
 }
 

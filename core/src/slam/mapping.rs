@@ -1,7 +1,8 @@
 //! Adding a frame to the map: bounds, keyframes, windows, optimisation, corrected poses.
 use super::semantics::steps_due;
-use super::{Breathe, Losses, Observation, Slam, SlamError};
+use super::{Losses, Observation, Pace, Slam, SlamError, Unpaced};
 use crate::{
+    commands::Commands,
     config::{RefinePoses, Tracker},
     engine::Engine,
     field::FieldShape,
@@ -13,10 +14,10 @@ use crate::{
         Batch, FrameFormat, Map, Rates, Scratch, SemanticSupervision, WINDOW_MAX, fusion, passes,
         suppressor,
     },
-    recording::Recording,
 };
 use alloc::{collections::BTreeSet, vec::Vec};
 use glam::DVec3;
+use mte_slam_shaders::random::salt;
 
 /// Depth images kept for culling are at most this wide.
 const OBSERVATION_WIDTH: u32 = 160;
@@ -85,6 +86,7 @@ impl Slam {
         &mut self,
         frame: &Frame,
         reference: bool,
+        pace: &mut dyn Pace,
     ) -> Result<(Losses, bool), SlamError> {
         let Some(pose) = self.frames.last().map(|f| f.world_from_camera) else {
             return Err(SlamError::NoMap);
@@ -106,7 +108,7 @@ impl Slam {
         };
         self.class_counts.add(self.info.classes.len(), frame);
         let (engine, map, _) = self.mapped()?;
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         map.frames.upload_frame(&mut r, slot, frame);
         engine.submit(&r)?;
 
@@ -138,6 +140,7 @@ impl Slam {
             .optimise(
                 &near,
                 Pass { iterations, rates, recent: RECENT, fusion_steps: steps, semantic: false },
+                pace,
             )
             .await?;
         self.mapping_calls += 1;
@@ -167,6 +170,14 @@ impl Slam {
     /// # Errors
     /// Engine failures.
     pub async fn finish_step(&mut self) -> Result<bool, SlamError> {
+        self.finish_step_with(&mut Unpaced).await
+    }
+
+    /// [`Slam::finish_step`] with the event loop of the program around it.
+    ///
+    /// # Errors
+    /// Engine failures.
+    pub async fn finish_step_with(&mut self, pace: &mut dyn Pace) -> Result<bool, SlamError> {
         let mut done = self.finished_iterations;
         let mut current = None;
         for (part, total) in self.finish_parts() {
@@ -188,7 +199,7 @@ impl Slam {
         let iterations = (total - done).min(FINISH_ITERATIONS);
         let left = f64::from(total - done) / f64::from(total);
         if part == Part::Anchors {
-            self.settle_anchors(iterations, left, done == 0).await?;
+            self.settle_anchors(iterations, left, done == 0, pace).await?;
         } else {
             let (m, f) = (&self.config.mapping, &self.config.fusion);
             let semantic = part == Part::Semantics;
@@ -202,7 +213,7 @@ impl Slam {
             };
             let all: Vec<usize> = (0..self.keyframes.len()).collect();
             let pass = Pass { iterations, rates, recent: 0, fusion_steps, semantic };
-            self.optimise(&all, pass).await?;
+            self.optimise(&all, pass, pace).await?;
         }
         self.finished_iterations += iterations;
         let more = self.finished_iterations < self.finish_iterations();
@@ -233,10 +244,11 @@ impl Slam {
         iterations: u32,
         left: f64,
         first: bool,
+        pace: &mut dyn Pace,
     ) -> Result<(), SlamError> {
         let (m, s) = (self.config.mapping.clone(), self.config.sampling.clone());
         let loss = self.config.loss.clone();
-        let (seed, breathe) = (self.config.seed, self.breathe);
+        let seed = self.config.seed;
         let keyframes: Vec<_> =
             self.keyframes.iter().map(|k| (k.slot, k.world_from_camera)).collect();
         let last_frame = self.keyframes.last().map_or(0, |k| k.frame);
@@ -244,7 +256,7 @@ impl Slam {
         let first_iteration = self.iteration;
         self.iteration += iterations;
         let (engine, map, scratch) = self.mapped()?;
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         for (slot, pose) in &keyframes {
             map.frames.upload_pose(&mut r, *slot, pose);
         }
@@ -272,7 +284,7 @@ impl Slam {
             passes::record_forward(&mut r, map, scratch, &batch);
             let (rate, begin) = (SETTLE_RATE * left, first && i == 0);
             suppressor::record_settling(&mut r, map, scratch, &batch, rate, begin);
-            submit_when_due(engine, &mut r, i + 1, iterations, breathe).await?;
+            submit_when_due(engine, &mut r, i + 1, iterations, pace).await?;
         }
         let counts = suppressor::read_counts(engine, map).await?;
         self.anchor_history.extend(counts.map(|c| (last_frame, c)));
@@ -285,7 +297,7 @@ impl Slam {
             self.keyframes.iter().map(|k| (k.slot, k.world_from_camera)).collect();
         let (engine, map, scratch) = self.mapped()?;
         for some in keyframes.chunks(ITERATIONS_PER_RECORDING as usize) {
-            let mut r = Recording::default();
+            let mut r = Commands::default();
             for (slot, pose) in some {
                 map.frames.upload_pose(&mut r, *slot, pose);
                 fusion::record_forward(&mut r, map, scratch, *slot);
@@ -345,9 +357,13 @@ impl Slam {
 
     /// Optimises map and poses over windows of the `recent` last keyframes (the current frame
     /// among them) and others drawn from the keyframes `near`.
-    async fn optimise(&mut self, near: &[usize], pass: Pass) -> Result<Losses, SlamError> {
+    async fn optimise(
+        &mut self,
+        near: &[usize],
+        pass: Pass,
+        pace: &mut dyn Pace,
+    ) -> Result<Losses, SlamError> {
         let Pass { iterations, rates, recent, fusion_steps, semantic } = pass;
-        let breathe = self.breathe;
         let m = self.config.mapping.clone();
         let s = self.config.sampling.clone();
         let mut loss = self.config.loss.clone();
@@ -390,7 +406,7 @@ impl Slam {
         };
         let (engine, map, scratch) = self.mapped()?;
         let mut touched = BTreeSet::new();
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         map.upload_class_weights(&mut r, &ray_weights, &token_weights, &rarity);
         for (slot, pose) in &keyframes {
             map.frames.upload_pose(&mut r, *slot, pose);
@@ -411,7 +427,8 @@ impl Slam {
                 let k = if map.fusion_steps().is_multiple_of(2) && recent > 0 {
                     n - 1
                 } else {
-                    let at = random_u32(seed, iteration, step, 22) as usize % chosen.len();
+                    let at = random_u32(seed, iteration, step, salt::SEMANTIC_KEYFRAME) as usize
+                        % chosen.len();
                     chosen.iter().nth(at).copied().unwrap_or(n - 1)
                 };
                 fusion::record_step(&mut r, map, scratch, keyframes[k].0, rates.decoders);
@@ -450,7 +467,7 @@ impl Slam {
                 }
                 passes::record_step(&mut r, map, scratch, &batch, rates);
             }
-            submit_when_due(engine, &mut r, i + 1, iterations, breathe).await?;
+            submit_when_due(engine, &mut r, i + 1, iterations, pace).await?;
         }
         let losses = read_losses(engine, scratch, rays, &loss).await?;
         if map.read_status(engine).await? & crate::kernels::adam::STATUS_NOT_FINITE != 0 {
@@ -475,18 +492,18 @@ impl Slam {
 /// Submits what is recorded once it is enough, or all there is, and starts anew.
 async fn submit_when_due(
     engine: &mut Engine,
-    r: &mut Recording,
+    r: &mut Commands,
     done: u32,
     iterations: u32,
-    breathe: Option<Breathe>,
+    pace: &mut dyn Pace,
 ) -> Result<(), SlamError> {
     if !done.is_multiple_of(ITERATIONS_PER_RECORDING) && done != iterations {
         return Ok(());
     }
     engine.submit(&core::mem::take(r))?;
-    if let Some(breathe) = breathe {
+    if pace.has_event_loop() {
         engine.synchronise().await?;
-        breathe(done, iterations).await;
+        pace.turn(done, iterations).await;
     }
     Ok(())
 }
@@ -501,7 +518,7 @@ fn draw_window(
 ) -> BTreeSet<usize> {
     let mut draw = 0;
     while window.len() < size && !others.is_empty() {
-        let k = random_u32(seed, iteration, draw, 21) as usize % others.len();
+        let k = random_u32(seed, iteration, draw, salt::WINDOW_KEYFRAME) as usize % others.len();
         window.insert(others.swap_remove(k));
         draw += 1;
     }

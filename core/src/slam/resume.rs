@@ -4,14 +4,14 @@ use super::{
     checkpoint::{Checkpoint, Dtype, Saved, SequenceState, wrong},
 };
 use crate::{
+    commands::Commands,
     config::Config,
     engine::Engine,
     field::FieldShape,
     frame::{Frame, SequenceInfo},
     keyframe::Keyframe,
     map::{FrameFormat, Map, Scratch, color_words},
-    recording::Recording,
-    track::odometry::{ColourRegistration, Rebuild, since},
+    track::odometry::{ColorRegistration, Rebuild, since},
 };
 use alloc::{collections::BTreeSet, format, string::String, vec::Vec};
 use serde::Serialize;
@@ -121,11 +121,11 @@ impl Resuming {
             let mut before = first;
             for (_, found) in later {
                 let image = colors.unwrap_or_else(|| color_words(&stored));
-                let change = ColourRegistration { scale: found.scale / before.scale };
+                let change = ColorRegistration { scale: found.scale / before.scale };
                 colors = Some(change.resampled(&image, &camera));
                 before = *found;
             }
-            let mut r = Recording::default();
+            let mut r = Commands::default();
             for slot in slots {
                 map.frames.upload_frame(&mut r, slot, &stored);
                 if let Some(image) = &colors {
@@ -151,7 +151,7 @@ impl Resuming {
         if let Some(map) = &slam.map {
             let buffers = map.state_buffers(slam.used_slots);
             if let Some(b) = buffers.iter().find(|b| b.name == "slots.pose_state") {
-                let mut r = Recording::default();
+                let mut r = Commands::default();
                 r.upload(b.buffer, 0, &pose_state);
                 slam.engine.submit(&r)?;
             }
@@ -192,7 +192,7 @@ fn build(
         if b.finite && words.iter().any(|w| !f32::from_bits(*w).is_finite()) {
             return Err(wrong(b.name, "a value that is not finite", "finite values"));
         }
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         r.upload(b.buffer, 0, &words);
         engine.submit(&r)?;
     }

@@ -1,6 +1,7 @@
 //! Locating a frame: odometry, then refinement against the field.
 use super::{PoseEstimate, Slam, SlamError, TrackingStatus, VIEW_SLOT};
 use crate::{
+    commands::Commands,
     config::Tracker,
     frame::Frame,
     kernels::{
@@ -10,7 +11,6 @@ use crate::{
     keyframe::sample_points,
     map::{Batch, SemanticSupervision, passes, pose_from_words},
     pose::Pose,
-    recording::Recording,
     track::{
         gauss_newton::{self, Guard},
         odometry::RgbdPyramid,
@@ -95,7 +95,7 @@ impl Slam {
         let (camera, unit, seed) = (self.info.camera, self.info.depth_unit_m, self.config.seed);
         let points = sample_points(frame, &camera, unit, t.align_pixels as usize, seed);
         let (engine, map, scratch) = self.mapped()?;
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         passes::upload_pixels(&mut r, scratch, &points);
         engine.submit(&r)?;
         let guard = Guard { offered: points.len(), ..Guard::default() };
@@ -122,7 +122,7 @@ impl Slam {
         let first_iteration = self.iteration;
         self.iteration += t.render_iterations + 1;
         let (engine, map, scratch) = self.mapped()?;
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         map.frames.upload_frame(&mut r, slot, frame);
         map.frames.upload_pose(&mut r, slot, start);
         scratch.upload_window(&mut r, &[(slot, false)]);

@@ -105,7 +105,7 @@ fn options(args: impl Iterator<Item = String>) -> Result<Options, Box<dyn Error>
     Ok(options)
 }
 
-/// Track one recording and print its line of the table.
+/// Tracks one recording and prints its line of the table.
 fn measure(name: &str, mut sequence: Box<dyn Sequence>, o: &Options) -> Result<(), Box<dyn Error>> {
     let info = sequence.info().clone();
     let mut odometer = Odometer::new(o.odometry.clone());
@@ -149,7 +149,7 @@ fn measure(name: &str, mut sequence: Box<dyn Sequence>, o: &Options) -> Result<(
     }
     let last: Vec<Pose> = odometer.trajectory().iter().map(|t| t.1).collect();
     if let Some(out) = &o.out {
-        // A line a frame: estimate, then truth, both `world_from_camera`, 3x4 row by row.
+        // One line per frame: estimate, then truth, both `world_from_camera`, 3x4 row by row.
         let mut text = String::new();
         for (i, estimate) in last.iter().enumerate() {
             let Some(truth) = sequence.truth(i) else { continue };
@@ -161,7 +161,7 @@ fn measure(name: &str, mut sequence: Box<dyn Sequence>, o: &Options) -> Result<(
         fs::write(out.join(format!("{name}.txt")), text)?;
     }
     if o.verbose {
-        println!("colour registration {:?}", odometer.colour_registration());
+        println!("colour registration {:?}", odometer.color_registration());
     }
     let error = |poses: &[Pose]| {
         let pairs: Vec<PosePair> = (poses.iter().enumerate())
@@ -180,7 +180,7 @@ fn measure(name: &str, mut sequence: Box<dyn Sequence>, o: &Options) -> Result<(
         per_frame * seconds,
         per_frame * prepare,
         odometer.keyframes().len(),
-        odometer.colour_registration().scale,
+        odometer.color_registration().scale,
     );
     Ok(())
 }

@@ -56,7 +56,7 @@ pub struct Alignment {
 }
 
 impl Alignment {
-    /// Smallest over largest eigenvalue, 0 for no information at all.
+    /// Returns the smallest over largest eigenvalue, 0 for no information at all.
     pub fn conditioning(&self) -> f64 {
         if self.eigenvalues[5] > 0.0 {
             (self.eigenvalues[0] / self.eigenvalues[5]).max(0.0)
@@ -66,7 +66,7 @@ impl Alignment {
     }
 }
 
-/// Align `current` to one reference, starting from `initial` (`reference_from_current`).
+/// Aligns `current` to one reference, starting from `initial` (`reference_from_current`).
 ///
 /// # Errors
 /// [`OdometryError::NoDepth`] where either frame has next to no depth, [`OdometryError::BadPose`].
@@ -81,7 +81,7 @@ pub fn align(
     align_many(&[reference], current, initial, config)
 }
 
-/// Align `current` to all `references` at once: one pose (`world_from_camera`), the sum of their
+/// Aligns `current` to all `references` at once: one pose (`world_from_camera`), the sum of their
 /// normal equations.
 ///
 /// # Errors
@@ -241,7 +241,7 @@ pub(super) fn align_levels(
     Ok(result)
 }
 
-/// Every how many points one is used; never a divisor of the row, which would pick columns.
+/// One point in this many is used; never a divisor of the row, which would pick columns.
 fn stride(points: usize, most: usize, width: usize) -> usize {
     let mut s = points.div_ceil(most.max(1)).max(1);
     while s > 1 && width.is_multiple_of(s) {

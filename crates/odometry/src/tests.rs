@@ -274,13 +274,13 @@ fn a_colour_camera_of_another_focal_length_is_found_and_an_equal_one_left_alone(
         let views: Vec<_> =
             poses.iter().map(|p| render_unregistered(&room(), p, true, scale)).collect();
         let pairs: Vec<_> = [(0, 1), (1, 2), (0, 2)]
-            .map(|(i, j)| registration::Pair {
+            .map(|(i, j)| registration_search::Pair {
                 reference: &views[i],
                 current: &views[j],
                 reference_from_current: poses[i].inverse().compose(&poses[j]),
             })
             .into();
-        let found = registration::estimate(&pairs).scale;
+        let found = registration_search::estimate(&pairs).scale;
         assert!((found - scale).abs() < 0.01, "found {found}, expected {scale}");
     }
 }

@@ -11,6 +11,7 @@ pub mod camera;
 pub mod classes;
 pub mod frame;
 pub mod hash;
+pub mod maths;
 pub mod parallel;
 pub mod pose;
 pub mod safetensors;
