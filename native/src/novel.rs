@@ -6,9 +6,9 @@ use crate::{
     evaluation::ViewScores,
     input,
     output::metrics::{InferenceFigures, Metrics, NovelFigures, SniFigures},
-    pipeline::score_view,
     record::RunRecord,
     screen::Screen,
+    views::score_view,
 };
 use anyhow::{Context, Result};
 use mte_slam_core::{config::Inference, slam::Slam};

@@ -10,6 +10,7 @@ use mte_slam_odometry::{Odometer, OdometryConfig, RgbdPyramid};
 use mte_slam_types::{
     pose::Pose,
     sequence::{Sequence, SequenceError, Source},
+    settings,
 };
 use std::{
     error::Error,
@@ -80,7 +81,6 @@ struct Options {
 }
 
 fn options(args: impl Iterator<Item = String>) -> Result<Options, Box<dyn Error>> {
-    let mut config = serde_json::to_value(OdometryConfig::default())?;
     let mut options = Options {
         only: String::new(),
         frames: None,
@@ -98,15 +98,10 @@ fn options(args: impl Iterator<Item = String>) -> Result<Options, Box<dyn Error>
             "verbose" => options.verbose = value == "1",
             "out" => options.out = Some(PathBuf::from(value)),
             _ => {
-                let mut at = &mut config;
-                for part in key.split('.') {
-                    at = at.get_mut(part).ok_or_else(|| format!("no setting {key}"))?;
-                }
-                *at = serde_json::from_str(value)?;
+                settings::set(&mut options.odometry, key, serde_json::from_str(value)?)?;
             }
         }
     }
-    options.odometry = serde_json::from_value(config)?;
     Ok(options)
 }
 

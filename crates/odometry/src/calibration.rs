@@ -39,7 +39,7 @@ impl Calibration {
         poses: &mut BTreeMap<usize, Pose>,
         config: &OdometryConfig,
     ) {
-        if self.pairs.len() >= config.registration_pairs {
+        if self.pairs.len() >= config.registration_pairs as usize {
             return;
         }
         let Some((newer, others)) = keyframes.split_last() else { return };
@@ -114,7 +114,7 @@ fn realign(
             .filter(|&(share, _)| share > 0.2)
             .collect();
         shares.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
-        shares.truncate(config.references.max(1));
+        shares.truncate(config.references.max(1) as usize);
         let references: Vec<Reference<'_>> = shares
             .iter()
             .map(|&(_, j)| Reference {

@@ -344,7 +344,7 @@ impl Odometer {
             Some(r) => align_levels(&[r], current, start, align, usize::MAX, 1)?.pose,
             None => *start,
         };
-        let chosen = self.choose(current, &coarse, self.config.references.max(1));
+        let chosen = self.choose(current, &coarse, self.config.references.max(1) as usize);
         let mut references: Vec<Reference<'_>> = chosen
             .iter()
             .map(|&k| Reference {
@@ -532,7 +532,7 @@ impl Odometer {
         if self.config.pose_graph {
             self.link_newest();
         }
-        if self.keyframes.len() > self.config.max_keyframes.max(2) {
+        if self.keyframes.len() > self.config.max_keyframes.max(2) as usize {
             self.drop_keyframe();
         }
         id
@@ -554,7 +554,7 @@ impl Odometer {
     fn link_newest(&mut self) {
         let Some((newest, _)) = self.keyframes.split_last() else { return };
         let links = self.choose_links(newest);
-        for (share, i) in links {
+        for i in links {
             let other = &self.keyframes[i];
             let start = other.world_from_camera.inverse().compose(&newest.world_from_camera);
             let reference = Reference {
@@ -568,7 +568,6 @@ impl Odometer {
                 continue;
             };
             if fit.inlier_ratio > self.config.min_inlier_ratio && fit.unconstrained == 0 {
-                let _ = share;
                 self.edges.push(Edge {
                     i: other.id,
                     j: newest.id,
@@ -594,7 +593,7 @@ impl Odometer {
         }
     }
 
-    fn choose_links(&self, newest: &OdometryKeyframe) -> Vec<(f64, usize)> {
+    fn choose_links(&self, newest: &OdometryKeyframe) -> Vec<usize> {
         let mut shares: Vec<(f64, usize)> = self
             .keyframes
             .iter()
@@ -611,7 +610,7 @@ impl Odometer {
             .filter(|&(share, _)| share > 0.3)
             .collect();
         shares.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
-        shares.truncate(self.config.graph_links);
-        shares
+        shares.truncate(self.config.graph_links as usize);
+        shares.into_iter().map(|(_, i)| i).collect()
     }
 }

@@ -115,7 +115,7 @@ impl RgbdPyramid {
         loop {
             let (w, h) = (camera.width as usize, camera.height as usize);
             levels.push(Level::new(&camera, &intensity, &depth, config, noise));
-            if levels.len() >= config.levels.max(1)
+            if levels.len() >= config.levels.max(1) as usize
                 || camera.width.min(camera.height) / 2 < config.smallest_side.max(8)
             {
                 break;

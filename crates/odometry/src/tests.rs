@@ -194,7 +194,13 @@ fn a_view_of_something_else_is_lost_and_adds_no_keyframe() {
 
 #[test]
 fn a_walk_stays_on_course_and_follows_corrections() {
-    let mut odometer = Odometer::new(OdometryConfig::default());
+    for pose_graph in [false, true] {
+        walk(OdometryConfig { pose_graph, ..OdometryConfig::default() });
+    }
+}
+
+fn walk(config: OdometryConfig) {
+    let mut odometer = Odometer::new(config);
     let mut truth = Pose::IDENTITY;
     let step = Pose::from_twist(&[0.02, 0.005, 0.015, 0.004, -0.01, 0.006]);
     for i in 0..12 {

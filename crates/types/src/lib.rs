@@ -16,4 +16,5 @@ pub mod parallel;
 pub mod pose;
 pub mod safetensors;
 pub mod sequence;
+pub mod settings;
 pub mod trajectory_file;

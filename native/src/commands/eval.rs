@@ -9,8 +9,9 @@ use crate::{
     output::{
         folder::replace_file, metrics::Metrics, pictures::unlabelled_id, trajectory::read_tum,
     },
-    pipeline::{restore, sequence_record},
     record::{self, RunRecord},
+    restore::restore,
+    results::sequence_record,
     screen::Screen,
 };
 use anyhow::{Context, Result, anyhow, bail};
