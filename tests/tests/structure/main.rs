@@ -66,6 +66,16 @@ fn no_crate_has_import_circles() {
     assert!(failures.is_empty(), "{failures}");
 }
 
+#[test]
+fn the_guide_shows_the_layouts_of_recordings() {
+    let text = |file: &str| fs::read_to_string(root().join(file)).expect(file);
+    let table = text("crates/dataset/src/layouts.md");
+    assert!(
+        text("docs/guide/recordings.md").contains(&table),
+        "docs/guide/recordings.md lacks the table of crates/dataset/src/layouts.md:\n{table}"
+    );
+}
+
 /// The files of every circle of a made-up crate.
 fn circles_in(files: &[(&str, &str)]) -> Vec<Vec<String>> {
     let files: BTreeMap<String, String> =
