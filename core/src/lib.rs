@@ -10,7 +10,6 @@ pub mod config;
 pub mod engine;
 pub mod field;
 pub mod kernels;
-pub mod keyframe;
 pub mod layout;
 pub mod map;
 pub mod recording;

@@ -1,6 +1,6 @@
 //! A run again from its checkpoint: to be shown, or to go on.
 use super::{
-    Slam, SlamError,
+    MapKeyframe, Slam, SlamError,
     checkpoint::{Checkpoint, Dtype, Saved, SequenceState, wrong},
 };
 use crate::{
@@ -8,7 +8,6 @@ use crate::{
     engine::Engine,
     field::FieldShape,
     frame::{Frame, SequenceInfo},
-    keyframe::Keyframe,
     map::{FrameFormat, Map, Scratch, color_words},
     recording::Recording,
     track::odometry::{ColourRegistration, OdometryConfig, Rebuild, since},
@@ -211,7 +210,11 @@ fn build(
     slam.keyframes = state
         .keyframes
         .iter()
-        .map(|k| Keyframe { frame: k.frame, slot: k.slot, world_from_camera: k.world_from_camera })
+        .map(|k| MapKeyframe {
+            frame: k.frame,
+            slot: k.slot,
+            world_from_camera: k.world_from_camera,
+        })
         .collect();
     Ok(slam)
 }

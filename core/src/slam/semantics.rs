@@ -1,7 +1,7 @@
-//! What mapping does for semantics beside rays: class weights, fusion steps, anchors by stage.
+//! What the classes of frames and map mean: how often each was seen, who gives a pixel its class.
 use super::Slam;
 use crate::{
-    config::{FusionConfig, Inference, LossConfig, SuppressorConfig},
+    config::{Inference, LossConfig},
     frame::Frame,
     map::ClassWeight,
 };
@@ -74,13 +74,6 @@ impl ClassCounts {
     }
 }
 
-/// Training steps of the fusion that are due in `count` iterations from the `first` on, of `steps`
-/// spread over `iterations`.
-pub(super) fn steps_due(steps: u32, iterations: u32, first: u32, count: u32) -> u32 {
-    let until = |i: u32| u64::from(i) * u64::from(steps) / u64::from(iterations.max(1));
-    (until(first + count) - until(first)) as u32
-}
-
 impl Slam {
     /// Whether any pixel that the map has learnt from had a class; without, its classes mean
     /// nothing.
@@ -99,26 +92,15 @@ impl Slam {
         self.config.suppressor.inference = inference;
     }
 
-    /// Whether the last optimisation is complete, and there are anchors: they tell classes from then
-    /// on, if so configured.
+    /// Whether the last optimisation is complete, and there are anchors: they give the classes from
+    /// then on, if so configured.
     pub fn anchors_settled(&self) -> bool {
-        self.has_anchors() && self.finished_iterations == self.finish_iterations()
+        self.has_anchors() && self.finished_iterations == self.finish_plan().iterations()
     }
 
     /// Whether classes of views and meshes are now those of the nearest anchors, not the head's.
     pub fn classes_by_anchors(&self) -> bool {
         self.config.suppressor.inference == Inference::Anchors && self.anchors_settled()
-    }
-
-    /// Weight of the compression loss by stage: features must have settled before they are held.
-    pub(super) fn compression(&self, c: &SuppressorConfig) -> f64 {
-        let since = f64::from(self.mapping_calls) - f64::from(c.start);
-        if since < 0.0 { 0.0 } else { c.weight * (since / f64::from(c.ramp.max(1))).min(1.0) }
-    }
-
-    /// Weight of the feature loss: the fusion must have been trained on one frame.
-    pub(super) fn feature(&self, c: &FusionConfig) -> f64 {
-        if self.mapping_calls == 0 { 0.0 } else { c.weight }
     }
 }
 
