@@ -26,14 +26,15 @@ pub use suppressor::{AnchorCounts, Suppressor};
 
 use crate::{
     camera::Camera,
+    commands::{Buffer, Commands},
     config::{Config, Head},
     engine::{Engine, EngineError},
     field::{FieldShape, decoder_floats, initial_decoders, initial_planes},
     frame::SequenceInfo,
     layout::FieldParams,
-    recording::{BufferId, Recording},
 };
 use alloc::{vec, vec::Vec};
+use mte_slam_shaders::random::salt;
 
 /// What all frames of a sequence share, as far as buffers depend on it.
 #[derive(Clone, Copy, Debug)]
@@ -86,15 +87,15 @@ pub struct Map {
     /// What the kernels' parameters are for every batch.
     pub(super) base: FieldParams,
     /// What Adam and scatter reported since the start.
-    pub(super) status: BufferId,
+    pub(super) status: Buffer<u32>,
     /// Weights of the classes in the cross-entropy of rays.
-    pub(super) class_weights: BufferId,
+    pub(super) class_weights: Buffer<[f32; 2]>,
     /// How rare the classes are, for the drawing of rays.
-    pub(super) class_rarity: BufferId,
+    pub(super) class_rarity: Buffer<f32>,
     /// Weights of the classes in the cross-entropy of the fusion's tokens.
-    pub(super) token_class_weights: BufferId,
+    pub(super) token_class_weights: Buffer<f32>,
     /// Stands for the anchors where there is no suppressor.
-    no_anchors: BufferId,
+    no_anchors: Buffer<[f32; 4]>,
 }
 
 impl Map {
@@ -143,16 +144,28 @@ impl Map {
             frames,
             classes,
             step: 0,
-            status: e.create_buffer("status", 4)?,
-            class_weights: e.create_buffer("class weights", 2 * classes.max(4) as usize)?,
-            class_rarity: e.create_buffer("class rarity", classes.max(4) as usize)?,
-            token_class_weights: e.create_buffer("token class weights", classes.max(4) as usize)?,
-            no_anchors: e.create_buffer("no anchors", 4)?,
+            status: e.create("status", 4)?,
+            class_weights: e.create("class weights", 2 * classes.max(4) as usize)?,
+            class_rarity: e.create("class rarity", classes.max(4) as usize)?,
+            token_class_weights: e.create("token class weights", classes.max(4) as usize)?,
+            no_anchors: e.create("no anchors", 4)?,
         };
-        let mut r = Recording::default();
-        r.upload(map.geometry.values, 0, &initial_planes(map.geometry.floats, seed, 0));
-        r.upload(map.appearance.values, 0, &initial_planes(map.appearance.floats, seed, 1));
-        r.upload(map.semantic.values, 0, &initial_planes(map.semantic.floats, seed, 2));
+        let mut r = Commands::default();
+        r.upload(
+            map.geometry.values,
+            0,
+            &initial_planes(map.geometry.floats, seed, salt::GEOMETRY_PLANES),
+        );
+        r.upload(
+            map.appearance.values,
+            0,
+            &initial_planes(map.appearance.floats, seed, salt::APPEARANCE_PLANES),
+        );
+        r.upload(
+            map.semantic.values,
+            0,
+            &initial_planes(map.semantic.floats, seed, salt::SEMANTIC_PLANES),
+        );
         r.upload(map.decoders.values, 0, &initial_decoders(classes, seed));
         let equal = vec![ClassWeight { weight: 1.0, adjustment: 0.0 }; classes as usize];
         let ones = vec![1.0; classes as usize];
@@ -167,7 +180,7 @@ impl Map {
     }
 
     /// The anchors, or what stands for them.
-    pub(super) fn anchors(&self) -> BufferId {
+    pub(super) fn anchors(&self) -> Buffer<[f32; 4]> {
         self.suppressor.as_ref().map_or(self.no_anchors, |s| s.anchors)
     }
 
@@ -185,7 +198,7 @@ impl Map {
     /// how rare they are; one value per class.
     pub fn upload_class_weights(
         &self,
-        r: &mut Recording,
+        r: &mut Commands,
         rays: &[ClassWeight],
         fusion: &[f32],
         rarity: &[f32],
@@ -214,10 +227,11 @@ impl Map {
         seed: u32,
     ) -> Result<(), EngineError> {
         let old = self.shape;
+        let semantic_floats = if self.classes > 0 { shape.surface_floats() } else { 0 };
         let grids = [
-            (self.geometry, false, shape.geometry_floats(), 0),
-            (self.appearance, true, shape.surface_floats(), 1),
-            (self.semantic, true, if self.classes > 0 { shape.surface_floats() } else { 0 }, 2),
+            (self.geometry, false, shape.geometry_floats(), salt::GEOMETRY_PLANES),
+            (self.appearance, true, shape.surface_floats(), salt::APPEARANCE_PLANES),
+            (self.semantic, true, semantic_floats, salt::SEMANTIC_PLANES),
         ];
         let mut new = [self.geometry, self.appearance, self.semantic];
         for (i, (t, surface, floats, salt)) in grids.into_iter().enumerate() {
@@ -227,14 +241,14 @@ impl Map {
             let names = ["geometry planes", "appearance planes", "semantic planes"];
             let larger = ParameterTensor::new(engine, names[i], floats)?;
             for (from, to, first) in [
-                (t.values, larger.values, initial_planes(floats, seed, salt)),
-                (t.moment1, larger.moment1, vec![0.0; floats]),
-                (t.moment2, larger.moment2, vec![0.0; floats]),
+                (t.values.id(), larger.values.id(), initial_planes(floats, seed, salt)),
+                (t.moment1.id(), larger.moment1.id(), vec![0.0; floats]),
+                (t.moment2.id(), larger.moment2.id(), vec![0.0; floats]),
             ] {
                 let values: Vec<f32> = engine.read_as(from, 0, t.floats).await?;
                 let mut fresh = first;
                 shape.carry_over(&old, surface, &values, &mut fresh);
-                let mut r = Recording::default();
+                let mut r = Commands::default();
                 r.upload(to, 0, &fresh);
                 engine.submit(&r)?;
             }

@@ -4,20 +4,22 @@
 //! whatever the batch; each part's gradients are added to the same rows of partial sums.
 use super::{Map, ParameterTensor, Rates, Scratch, parameters::AdamStep};
 use crate::{
+    call::Call,
+    commands::{Buffer, Commands},
     engine::{Engine, EngineError},
     kernels::{
-        matrix_product::{MATRIX_PRODUCT, MatrixProductParams, NO_SUMS},
-        reduce_partials::{REDUCE_PARTIALS, ReducePartialsParams},
-        sample_features::SAMPLE_FEATURES,
-        sample_logits::{SAMPLE_LOGITS, SampleLogitsParams},
-        scatter_geometry::SCATTER_GEOMETRY,
+        matrix_product::{self, MatrixProductParams, NO_SUMS},
+        reduce_partials::{self, ReducePartialsParams},
+        sample_features,
+        sample_logits::{self, SampleLogitsParams},
+        scatter_geometry,
         shared::{FLAG_DENSE, RAY_WORDS, random_f32},
     },
     layout::{CHANNELS, FieldParams, RAY_OUT_FLOATS},
-    recording::{BufferId, Recording},
 };
 use alloc::{vec, vec::Vec};
 use core::ops::Range;
+use mte_slam_shaders::random::{first_values, salt};
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
@@ -61,16 +63,16 @@ pub struct SampleHead {
 
 /// Activations and gradients of the head.
 pub struct SampleScratch {
-    features: BufferId,
-    feature_gradient: BufferId,
-    slot_depths: BufferId,
-    slot_weights: BufferId,
+    features: Buffer<[f32; 4]>,
+    feature_gradient: Buffer<[f32; 4]>,
+    slot_depths: Buffer<f32>,
+    slot_weights: Buffer<f32>,
     /// Outputs of the layers for a part's samples; the last are the logits, then their gradients.
-    outputs: [BufferId; 4],
+    outputs: [Buffer<f32>; 4],
     /// Gradients at hidden layers, taking turns.
-    deltas: [BufferId; 2],
-    partials: BufferId,
-    no_mask: BufferId,
+    deltas: [Buffer<f32>; 2],
+    partials: Buffer<f32>,
+    no_mask: Buffer<f32>,
 }
 
 impl SampleHead {
@@ -89,10 +91,17 @@ impl SampleHead {
         for layer in &head.layers {
             let limit = (6.0 / layer.inputs as f32).sqrt();
             for i in layer.weights..layer.bias() {
-                w[i as usize] = (2.0 * random_f32(seed, 0x1721, i, 11) - 1.0) * limit;
+                w[i as usize] =
+                    (2.0 * random_f32(
+                        seed,
+                        first_values::SAMPLE_HEAD,
+                        i,
+                        salt::SAMPLE_HEAD_AS_KEYFRAME_POINT,
+                    ) - 1.0)
+                        * limit;
             }
         }
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         r.upload(head.parameters.values, 0, &w);
         e.submit(&r)?;
         Ok(head)
@@ -109,56 +118,51 @@ impl SampleScratch {
         rays: usize,
     ) -> Result<SampleScratch, EngineError> {
         let slots = trained.max(rays * VIEW_SLOTS as usize);
-        let hidden = |e: &mut Engine, name| e.create_buffer(name, (PART * HIDDEN) as usize);
+        let hidden = |e: &mut Engine, name| e.create(name, (PART * HIDDEN) as usize);
         let partials = SPLITS as usize * head.parameters.floats;
         Ok(SampleScratch {
-            features: e.create_buffer("sample features", slots * INPUTS as usize)?,
-            feature_gradient: e
-                .create_buffer("sample feature gradients", trained * INPUTS as usize)?,
-            slot_depths: e.create_buffer("slot depths", slots)?,
-            slot_weights: e.create_buffer("slot weights", slots)?,
+            features: e.create("sample features", slots * INPUTS as usize)?,
+            feature_gradient: e.create("sample feature gradients", trained * INPUTS as usize)?,
+            slot_depths: e.create("slot depths", slots)?,
+            slot_weights: e.create("slot weights", slots)?,
             outputs: [
                 hidden(e, "sample layer 1")?,
                 hidden(e, "sample layer 2")?,
                 hidden(e, "sample layer 3")?,
-                e.create_buffer("sample logits", (PART * classes) as usize)?,
+                e.create("sample logits", (PART * classes) as usize)?,
             ],
             deltas: [hidden(e, "sample deltas 1")?, hidden(e, "sample deltas 2")?],
-            partials: e.create_buffer("sample head partials", partials)?,
-            no_mask: e.create_buffer("no mask", 4)?,
+            partials: e.create("sample head partials", partials)?,
+            no_mask: e.create("no mask", 4)?,
         })
     }
 }
 
 /// Classes (and, with labels, the loss) of the batch's rays.
-pub(super) fn record_classes(r: &mut Recording, map: &Map, scratch: &Scratch, p: &FieldParams) {
+pub(super) fn record_classes(r: &mut Commands, map: &Map, scratch: &Scratch, p: &FieldParams) {
     record_head(r, map, scratch, p, false);
 }
 
 /// Classes, loss and all gradients of the head and the semantic planes.
-pub(super) fn record_backward(r: &mut Recording, map: &Map, scratch: &Scratch, p: &FieldParams) {
+pub(super) fn record_backward(r: &mut Commands, map: &Map, scratch: &Scratch, p: &FieldParams) {
     record_head(r, map, scratch, p, true);
 }
 
-fn record_head(r: &mut Recording, map: &Map, scratch: &Scratch, p: &FieldParams, train: bool) {
+fn record_head(r: &mut Commands, map: &Map, scratch: &Scratch, p: &FieldParams, train: bool) {
     let (Some(h), Some(s)) = (&map.sample_head, &scratch.sample_head) else { return };
     let views = p.flags & FLAG_DENSE != 0;
     let slots = if views { p.samples.min(VIEW_SLOTS) } else { p.samples };
     let p = FieldParams { slots, ..*p };
-    r.dispatch_1d(
-        &SAMPLE_FEATURES,
-        &p,
-        &[
-            scratch.rays,
-            scratch.depths,
-            scratch.weights,
-            map.semantic.values,
-            s.features,
-            s.slot_depths,
-            s.slot_weights,
-        ],
-        (p.rays * slots) as usize,
-    );
+    sample_features::Buffers {
+        rays: scratch.rays,
+        depths: scratch.depths,
+        weights: scratch.weights,
+        planes_semantic: map.semantic.values,
+        features: s.features,
+        slot_depths: s.slot_depths,
+        slot_weights: s.slot_weights,
+    }
+    .record(r, &p, (p.rays * slots) as usize);
     let floats = h.parameters.floats;
     if train {
         r.clear(s.partials, 0, SPLITS as usize * floats);
@@ -172,12 +176,12 @@ fn record_head(r: &mut Recording, map: &Map, scratch: &Scratch, p: &FieldParams,
         return;
     }
     let columns = floats as u32;
-    r.dispatch_1d(
-        &REDUCE_PARTIALS,
-        &ReducePartialsParams { rows: SPLITS, columns, row: columns, offset: 0 },
-        &[s.partials, h.parameters.gradient],
-        floats,
-    );
+    reduce_partials::Buffers { partials: s.partials, gradient: h.parameters.gradient.cast() }
+        .record(
+            r,
+            &ReducePartialsParams { rows: SPLITS, columns, row: columns, offset: 0 },
+            floats,
+        );
     // The kernel scatters gradients of samples into any planes whose grids it is given; a slot
     // without weight is skipped as a sample without gradient.
     let scatter = FieldParams {
@@ -188,24 +192,20 @@ fn record_head(r: &mut Recording, map: &Map, scratch: &Scratch, p: &FieldParams,
         samples: slots,
         ..p
     };
-    r.dispatch_1d(
-        &SCATTER_GEOMETRY,
-        &scatter,
-        &[
-            scratch.rays,
-            s.slot_depths,
-            s.slot_weights,
-            s.feature_gradient,
-            map.semantic.gradient,
-            map.status,
-        ],
-        p.rays as usize * 24,
-    );
+    scatter_geometry::Buffers {
+        rays: scratch.rays,
+        depths: s.slot_depths,
+        distance_gradient: s.slot_weights,
+        features: s.feature_gradient,
+        gradient: map.semantic.gradient,
+        status: map.status,
+    }
+    .record(r, &scatter, p.rays as usize * 24);
 }
 
 /// The part of the batch that the rays of a range are.
 fn record_part(
-    r: &mut Recording,
+    r: &mut Commands,
     map: &Map,
     scratch: &Scratch,
     p: &FieldParams,
@@ -215,12 +215,12 @@ fn record_part(
     let (Some(h), Some(s)) = (&map.sample_head, &scratch.sample_head) else { return };
     let (first_ray, rays) = (part.start, part.end - part.start);
     let rows = rays * p.slots;
-    let mut product = |m: MatrixProductParams, buffers: [BufferId; 4]| {
-        r.dispatch(&MATRIX_PRODUCT, &m, &buffers, m.workgroups());
+    let mut product = |m: MatrixProductParams, buffers: matrix_product::Buffers| {
+        buffers.record_workgroups(r, &m, m.workgroups());
     };
     // Where the inputs of layer i lie, and from which float on.
     let at = first_ray * p.slots * INPUTS;
-    let input = |i: usize| if i == 0 { (s.features, at) } else { (s.outputs[i - 1], 0) };
+    let input = |i: usize| if i == 0 { (s.features.floats(), at) } else { (s.outputs[i - 1], 0) };
     for (i, layer) in h.layers.iter().enumerate() {
         let (from, left_offset) = input(i);
         let layer = MatrixProductParams {
@@ -240,10 +240,25 @@ fn record_part(
             sums_offset: NO_SUMS,
             ..MatrixProductParams::default()
         };
-        product(layer, [from, h.parameters.values, s.no_mask, s.outputs[i]]);
+        product(
+            layer,
+            matrix_product::Buffers {
+                left: from,
+                right: h.parameters.values.floats(),
+                mask: s.no_mask,
+                product: s.outputs[i],
+            },
+        );
     }
-    r.dispatch(
-        &SAMPLE_LOGITS,
+    sample_logits::Buffers {
+        rays: scratch.rays,
+        slot_weights: s.slot_weights,
+        class_weights: map.class_weights,
+        logits: s.outputs[3],
+        ray_out: scratch.ray_out.cast(),
+    }
+    .record_workgroups(
+        r,
         &SampleLogitsParams {
             rays,
             first_ray,
@@ -253,14 +268,13 @@ fn record_part(
             train: u32::from(train),
             weight_semantic: p.weight_semantic,
         },
-        &[scratch.rays, s.slot_weights, map.class_weights, s.outputs[3], scratch.ray_out],
         [rays, 1, 1],
     );
     if !train {
         return;
     }
-    let mut product = |m: MatrixProductParams, buffers: [BufferId; 4]| {
-        r.dispatch(&MATRIX_PRODUCT, &m, &buffers, m.workgroups());
+    let mut product = |m: MatrixProductParams, buffers: matrix_product::Buffers| {
+        buffers.record_workgroups(r, &m, m.workgroups());
     };
     let mut delta = s.outputs[3];
     for (i, layer) in h.layers.iter().enumerate().rev() {
@@ -282,7 +296,15 @@ fn record_part(
             sums_offset: layer.bias(),
             ..MatrixProductParams::default()
         };
-        product(weights, [from, delta, s.no_mask, s.partials]);
+        product(
+            weights,
+            matrix_product::Buffers {
+                left: from,
+                right: delta,
+                mask: s.no_mask,
+                product: s.partials,
+            },
+        );
         let inputs = MatrixProductParams {
             rows,
             columns: layer.inputs,
@@ -300,14 +322,22 @@ fn record_part(
             ..MatrixProductParams::default()
         };
         let (mask, to) =
-            if i > 0 { (from, s.deltas[i % 2]) } else { (s.no_mask, s.feature_gradient) };
-        product(inputs, [delta, h.parameters.values, mask, to]);
+            if i > 0 { (from, s.deltas[i % 2]) } else { (s.no_mask, s.feature_gradient.floats()) };
+        product(
+            inputs,
+            matrix_product::Buffers {
+                left: delta,
+                right: h.parameters.values.floats(),
+                mask,
+                product: to,
+            },
+        );
         delta = to;
     }
 }
 
 /// The head's part of step `number` of the map.
-pub(super) fn record_step(r: &mut Recording, map: &Map, rates: Rates, number: u32) {
+pub(super) fn record_step(r: &mut Commands, map: &Map, rates: Rates, number: u32) {
     let Some(h) = &map.sample_head else { return };
     let floats = 0..h.parameters.floats;
     let step = AdamStep { floats, quanta: None, rate: rates.decoders, number };
@@ -330,7 +360,7 @@ pub(super) async fn classes_at(
         }
         let n = chunk.len();
         let weights: Vec<f32> = (0..2 * n).map(|i| ((i + 1) % 2) as f32).collect();
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         r.upload(scratch.rays, 0, &rays);
         r.clear(scratch.depths, 0, 2 * n);
         r.upload(scratch.weights, 0, &weights);

@@ -2,9 +2,9 @@
 //! them, and the counters beside them.
 use super::{Map, ParameterTensor};
 use crate::{
+    commands::BufferId,
     kernels::pose_step::POSE_STATE_FLOATS,
     layout::{ANCHOR_FLOATS, CHANNELS},
-    recording::BufferId,
 };
 use alloc::{format, string::String, vec, vec::Vec};
 use serde::{Deserialize, Serialize};
@@ -46,9 +46,11 @@ impl Map {
     pub(crate) fn state_buffers(&self, used_slots: u32) -> Vec<StateBuffer> {
         let mut all = Vec::new();
         let mut parameters = |name: &str, t: &ParameterTensor, columns: usize| {
-            for (part, buffer) in
-                [("values", t.values), ("moment1", t.moment1), ("moment2", t.moment2)]
-            {
+            for (part, buffer) in [
+                ("values", t.values.id()),
+                ("moment1", t.moment1.id()),
+                ("moment2", t.moment2.id()),
+            ] {
                 all.push(StateBuffer {
                     name: format!("{name}.{part}"),
                     buffer,
@@ -71,26 +73,26 @@ impl Map {
         let slots = used_slots.min(self.slots()) as usize;
         let classes = self.classes as usize;
         let mut others = vec![
-            ("status", self.status, [1, 4], false),
-            ("class_weights", self.class_weights, [classes, 2], true),
-            ("class_rarity", self.class_rarity, [1, classes], true),
-            ("token_class_weights", self.token_class_weights, [1, classes], true),
-            ("slots.pose_state", self.frames.pose_state, [slots, POSE_STATE_FLOATS], true),
+            ("status", self.status.id(), [1, 4], false),
+            ("class_weights", self.class_weights.id(), [classes, 2], true),
+            ("class_rarity", self.class_rarity.id(), [1, classes], true),
+            ("token_class_weights", self.token_class_weights.id(), [1, classes], true),
+            ("slots.pose_state", self.frames.pose_state.id(), [slots, POSE_STATE_FLOATS], true),
         ];
         if let Some(f) = &self.fusion {
             others.push((
                 "slots.targets",
-                self.frames.targets,
+                self.frames.targets.id(),
                 [slots, f.grid.target_floats()],
                 true,
             ));
         }
         if let Some(s) = &self.suppressor {
             let n = s.slots() as usize;
-            others.push(("anchors", s.anchors, [n, ANCHOR_FLOATS], false));
-            others.push(("anchors.votes", s.votes, [n, classes], true));
-            others.push(("anchors.counts", s.counts, [1, 4], false));
-            others.push(("anchors.support", s.support, [classes, 2], false));
+            others.push(("anchors", s.anchors.id(), [n, ANCHOR_FLOATS], false));
+            others.push(("anchors.votes", s.votes.id(), [n, classes], true));
+            others.push(("anchors.counts", s.counts.id(), [1, 4], false));
+            others.push(("anchors.support", s.support.id(), [classes, 2], false));
         }
         all.extend(others.into_iter().map(|(name, buffer, shape, floats)| StateBuffer {
             name: name.into(),

@@ -1,16 +1,17 @@
 //! Feature redundancy suppressor (paper III-B): the anchors, and the passes that move them.
 use super::{Batch, Map, Scratch};
 use crate::{
+    call::Call,
+    commands::{Buffer, Commands},
     config::{AnchorRule, SuppressorConfig},
     engine::{Engine, EngineError},
     kernels::{
-        maintain_anchors::{MAINTAIN_ANCHORS, MaintainAnchorsParams},
-        match_rivals::{MATCH_RIVALS, MatchRivalsParams},
-        settle_anchors::{SETTLE_ANCHORS, SettleAnchorsParams},
-        update_anchors::{UPDATE_ANCHORS, UpdateAnchorsParams},
+        maintain_anchors::{self, MaintainAnchorsParams},
+        match_rivals::{self, MatchRivalsParams},
+        settle_anchors::{self, SettleAnchorsParams},
+        update_anchors::{self, UpdateAnchorsParams},
     },
     layout::{ANCHOR_FLOATS, NO_DISTANCE},
-    recording::{BufferId, Recording},
 };
 use alloc::{vec, vec::Vec};
 use serde::{Deserialize, Serialize};
@@ -22,12 +23,12 @@ const SETTLE_SLOPE: f32 = 400.0;
 /// Buffers of the suppressor.
 pub struct Suppressor {
     /// Anchors, [`ANCHOR_FLOATS`] each.
-    pub anchors: BufferId,
+    pub anchors: Buffer<[f32; 4]>,
     /// Votes of the matched rays' labels, one float per slot and class.
-    pub votes: BufferId,
-    pub(super) counts: BufferId,
+    pub votes: Buffer<f32>,
+    pub(super) counts: Buffer<u32>,
     /// Since the anchors began to settle: rays of each class of the head whose labels agree, and do not.
-    pub(super) support: BufferId,
+    pub(super) support: Buffer<u32>,
     config: SuppressorConfig,
 }
 
@@ -52,17 +53,17 @@ impl Suppressor {
     ) -> Result<Suppressor, EngineError> {
         let n = config.anchors as usize;
         let s = Suppressor {
-            anchors: e.create_buffer("anchors", n * ANCHOR_FLOATS)?,
-            votes: e.create_buffer("votes", n * classes as usize)?,
-            counts: e.create_buffer("anchor counts", 4)?,
-            support: e.create_buffer("class support", 2 * classes as usize)?,
+            anchors: e.create("anchors", n * ANCHOR_FLOATS)?,
+            votes: e.create("votes", n * classes as usize)?,
+            counts: e.create("anchor counts", 4)?,
+            support: e.create("class support", 2 * classes as usize)?,
             config: config.clone(),
         };
         let mut free = vec![0_u32; n * ANCHOR_FLOATS];
         for a in free.chunks_exact_mut(ANCHOR_FLOATS) {
             a[16] = 255;
         }
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         r.upload(s.anchors, 0, &free);
         e.submit(&r)?;
         Ok(s)
@@ -77,11 +78,17 @@ impl Suppressor {
 /// Moves the anchors to the features of the last forward pass.
 ///
 /// Records nothing without a suppressor.
-pub fn record_update(r: &mut Recording, map: &Map, scratch: &Scratch, b: &Batch<'_>) {
+pub fn record_update(r: &mut Commands, map: &Map, scratch: &Scratch, b: &Batch<'_>) {
     let Some(s) = &map.suppressor else { return };
     let c = &s.config;
-    r.dispatch(
-        &UPDATE_ANCHORS,
+    update_anchors::Buffers {
+        rays: scratch.rays,
+        ray_state: scratch.ray_state,
+        anchors: s.anchors,
+        votes: s.votes,
+    }
+    .record_workgroups(
+        r,
         &UpdateAnchorsParams {
             rays: b.rays(),
             anchors: c.anchors,
@@ -92,7 +99,6 @@ pub fn record_update(r: &mut Recording, map: &Map, scratch: &Scratch, b: &Batch<
             decay: c.decay as f32,
             variation_decay: 0.9,
         },
-        &[scratch.rays, scratch.ray_state, s.anchors, s.votes],
         [c.anchors, 1, 1],
     );
 }
@@ -100,12 +106,20 @@ pub fn record_update(r: &mut Recording, map: &Map, scratch: &Scratch, b: &Batch<
 /// Drops, merges and spawns anchors from the features of the last forward pass.
 ///
 /// Records nothing without a suppressor.
-pub fn record_maintenance(r: &mut Recording, map: &Map, scratch: &Scratch, b: &Batch<'_>) {
+pub fn record_maintenance(r: &mut Commands, map: &Map, scratch: &Scratch, b: &Batch<'_>) {
     let Some(s) = &map.suppressor else { return };
     let c = &s.config;
     let square = |d: f64| (d * d) as f32;
-    r.dispatch(
-        &MAINTAIN_ANCHORS,
+    maintain_anchors::Buffers {
+        rays: scratch.rays,
+        ray_state: scratch.ray_state,
+        anchors: s.anchors,
+        votes: s.votes,
+        anchor_counts: s.counts,
+        class_support: s.support,
+    }
+    .record_workgroups(
+        r,
         &MaintainAnchorsParams {
             rays: b.rays(),
             anchors: c.anchors,
@@ -118,7 +132,6 @@ pub fn record_maintenance(r: &mut Recording, map: &Map, scratch: &Scratch, b: &B
             min_age: f64::from(c.min_age) as f32,
             ..MaintainAnchorsParams::default()
         },
-        &[scratch.rays, scratch.ray_state, s.anchors, s.votes, s.counts, s.support],
         [1, 1, 1],
     );
 }
@@ -130,7 +143,7 @@ pub fn record_maintenance(r: &mut Recording, map: &Map, scratch: &Scratch, b: &B
 ///
 /// Records nothing without a suppressor.
 pub fn record_settling(
-    r: &mut Recording,
+    r: &mut Commands,
     map: &Map,
     scratch: &Scratch,
     b: &Batch<'_>,
@@ -139,9 +152,15 @@ pub fn record_settling(
 ) {
     let Some(s) = &map.suppressor else { return };
     let (anchors, classes) = (s.config.anchors, map.classes);
-    let settle = |r: &mut Recording, rays| {
-        r.dispatch(
-            &SETTLE_ANCHORS,
+    let settle = |r: &mut Commands, rays| {
+        settle_anchors::Buffers {
+            rays: scratch.rays,
+            ray_state: scratch.ray_state,
+            decoders: map.decoders.values,
+            anchors: s.anchors,
+        }
+        .record_workgroups(
+            r,
             &SettleAnchorsParams {
                 rays,
                 anchors,
@@ -150,7 +169,6 @@ pub fn record_settling(
                 slope: SETTLE_SLOPE,
                 ..SettleAnchorsParams::default()
             },
-            &[scratch.rays, scratch.ray_state, map.decoders.values, s.anchors],
             [anchors, 1, 1],
         );
     };
@@ -159,15 +177,29 @@ pub fn record_settling(
         settle(r, 0);
     }
     let rays = b.rays();
-    r.dispatch_1d(
-        &MATCH_RIVALS,
+    match_rivals::Buffers {
+        ray_out: scratch.ray_out,
+        anchors: s.anchors,
+        rays: scratch.rays,
+        ray_state: scratch.ray_state,
+        class_support: s.support,
+    }
+    .record(
+        r,
         &MatchRivalsParams { rays, anchors, classes, ..MatchRivalsParams::default() },
-        &[scratch.ray_out, s.anchors, scratch.rays, scratch.ray_state, s.support],
         rays as usize,
     );
     settle(r, rays);
-    r.dispatch(
-        &MAINTAIN_ANCHORS,
+    maintain_anchors::Buffers {
+        rays: scratch.rays,
+        ray_state: scratch.ray_state,
+        anchors: s.anchors,
+        votes: s.votes,
+        anchor_counts: s.counts,
+        class_support: s.support,
+    }
+    .record_workgroups(
+        r,
         &MaintainAnchorsParams {
             rays,
             anchors,
@@ -179,7 +211,6 @@ pub fn record_settling(
             supported: 1,
             ..MaintainAnchorsParams::default()
         },
-        &[scratch.rays, scratch.ray_state, s.anchors, s.votes, s.counts, s.support],
         [1, 1, 1],
     );
 }

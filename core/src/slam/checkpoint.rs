@@ -15,7 +15,7 @@ use crate::{
     hash::Hasher,
     map::{AnchorCounts, Counters},
     pose::Pose,
-    track::odometry::{ColourRegistration, OdometerState},
+    track::odometry::{ColorRegistration, OdometerState},
 };
 use alloc::{
     collections::BTreeMap,
@@ -144,7 +144,7 @@ pub(super) struct State {
     pub keyframes: Vec<SavedKeyframe>,
     pub observed_frames: Vec<usize>,
     pub anchor_history: Vec<(usize, AnchorCounts)>,
-    pub registrations: Vec<(usize, ColourRegistration)>,
+    pub registrations: Vec<(usize, ColorRegistration)>,
     pub odometer: OdometerState,
 }
 
@@ -177,6 +177,15 @@ fn configuration_hash(json: &str) -> String {
     let mut h = Hasher::default();
     h.bytes(json.as_bytes());
     format!("{:016x}", h.finish())
+}
+
+/// The configuration in the text of a state, as it was written: that of an earlier version may lack
+/// settings, and written again it would have them. `None` where it does not stand first.
+fn recorded_configuration(state: &str) -> Option<&str> {
+    let text = state.strip_prefix("{\"config\":")?;
+    let mut values = serde_json::Deserializer::from_str(text).into_iter::<serde::de::IgnoredAny>();
+    values.next()?.ok()?;
+    text.get(..values.byte_offset())
 }
 
 /// A hash of a sequence and the frames that were processed.
@@ -301,7 +310,10 @@ impl Checkpoint {
             .map_err(|e| wrong("state", e, "the state of a run"))?;
         let n = self.frames().unwrap_or(0);
         let hashes: Vec<u64> = self.values("frames.hash", Dtype::U64, n)?;
-        let hash = configuration_hash(&json(&state.config)?);
+        let hash = match recorded_configuration(entry("state")?) {
+            Some(text) => configuration_hash(text),
+            None => configuration_hash(&json(&state.config)?),
+        };
         if *entry("configuration")? != hash {
             return Err(wrong("configuration", entry("configuration")?, hash));
         }

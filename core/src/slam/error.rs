@@ -11,7 +11,7 @@ pub enum SlamError {
     #[error(transparent)]
     Engine(#[from] EngineError),
     /// The configuration is not usable.
-    #[error(transparent)]
+    #[error("configuration: {0}")]
     Config(#[from] ConfigError),
     /// Tracking could not even be tried.
     #[error(transparent)]

@@ -1,10 +1,10 @@
 //! The last optimisation: all keyframes once more, then the semantics, then the anchors.
 use super::{
-    Slam, SlamError,
-    mapping::ITERATIONS_PER_RECORDING,
+    Pace, Slam, SlamError, Unpaced,
+    mapping::ITERATIONS_PER_SUBMISSION,
     plan::{FinishPlan, OptimisationPlan, Stage},
 };
-use crate::{map::fusion, recording::Recording};
+use crate::{commands::Commands, map::fusion};
 
 impl Slam {
     /// Goes over all keyframes once more, with falling rates: [`Slam::finish_step`] to its end.
@@ -22,6 +22,14 @@ impl Slam {
     /// # Errors
     /// Engine failures.
     pub async fn finish_step(&mut self) -> Result<bool, SlamError> {
+        self.finish_step_with(&mut Unpaced).await
+    }
+
+    /// [`Slam::finish_step`] with the event loop of the program around it.
+    ///
+    /// # Errors
+    /// Engine failures.
+    pub async fn finish_step_with(&mut self, pace: &mut dyn Pace) -> Result<bool, SlamError> {
         let finish = self.finish_plan();
         let next = finish.next(self.finished_iterations);
         let Some(part) = next.filter(|_| !self.keyframes.is_empty()) else {
@@ -34,7 +42,7 @@ impl Slam {
             self.refresh_targets()?;
         }
         let plan = OptimisationPlan::for_finish(&self.config, &self.progress(), &part);
-        self.optimise(&plan).await?;
+        self.optimise(&plan, pace).await?;
         self.finished_iterations += part.iterations;
         let more = self.finished_iterations < finish.iterations();
         if !more {
@@ -58,8 +66,8 @@ impl Slam {
         let (Some(map), Some(scratch)) = (&self.map, &self.scratch) else {
             return Err(SlamError::NoMap);
         };
-        for some in self.keyframes.chunks(ITERATIONS_PER_RECORDING as usize) {
-            let mut r = Recording::default();
+        for some in self.keyframes.chunks(ITERATIONS_PER_SUBMISSION as usize) {
+            let mut r = Commands::default();
             for k in some {
                 map.frames.upload_pose(&mut r, k.slot, &k.world_from_camera);
                 fusion::record_forward(&mut r, map, scratch, k.slot);

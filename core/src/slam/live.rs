@@ -155,7 +155,7 @@ impl Slam {
                 let Some(f) = self.frames.get(o.frame) else { continue };
                 let world_from_camera = f.world_from_camera;
                 let (camera, depth, depth_unit_m) = (&camera, &o.depth[..], unit);
-                let view = mesh::View { camera, world_from_camera, depth, depth_unit_m };
+                let view = mesh::CullingView { camera, world_from_camera, depth, depth_unit_m };
                 seen.add_view(&chunk.mesh, &view, protocol);
             }
             mesh::cull(&mut chunk.mesh, &seen, Keep::AllSeen);

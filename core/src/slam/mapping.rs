@@ -1,20 +1,20 @@
-//! Recording the plans of the optimisation.
+//! Commands the plans of the optimisation.
 use super::{
-    Losses, Slam, SlamError,
+    Losses, Pace, Slam, SlamError,
     plan::{IterationPlan, OptimisationPlan, Progress, Stage},
 };
 use crate::{
+    commands::Commands,
     config::LossConfig,
     engine::Engine,
     kernels::adam::STATUS_NOT_FINITE,
     layout::RAY_OUT_FLOATS,
     map::{Map, Scratch, fusion, passes, suppressor},
-    recording::Recording,
 };
 use alloc::collections::BTreeSet;
 
-/// Iterations recorded at once: long enough to amortise, short enough for watchdogs.
-pub(super) const ITERATIONS_PER_RECORDING: u32 = 4;
+/// Iterations recorded and submitted at once: long enough to amortise, short enough for watchdogs.
+pub(super) const ITERATIONS_PER_SUBMISSION: u32 = 4;
 
 impl Slam {
     /// What plans depend on beside the configuration.
@@ -29,14 +29,18 @@ impl Slam {
 
     /// Carries a plan out: map, anchors and poses move. Returns the losses of the last iteration,
     /// zeros where only anchors are trained.
-    pub(super) async fn optimise(&mut self, plan: &OptimisationPlan) -> Result<Losses, SlamError> {
+    pub(super) async fn optimise(
+        &mut self,
+        plan: &OptimisationPlan,
+        pace: &mut dyn Pace,
+    ) -> Result<Losses, SlamError> {
         self.iteration += plan.iterations;
         let last_frame = self.keyframes.last().map_or(0, |k| k.frame);
         let (Some(map), Some(scratch)) = (&mut self.map, &self.scratch) else {
             return Err(SlamError::NoMap);
         };
         let engine = &mut self.engine;
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         if plan.stage != Stage::Anchors {
             let draws = self.config.sampling.rare_draws;
             let counts = &self.class_counts;
@@ -58,9 +62,12 @@ impl Slam {
             rays = plan.batch(&iteration).rays();
             visited.extend(iteration.keyframes);
             let done = i + 1;
-            if done.is_multiple_of(ITERATIONS_PER_RECORDING) || done == plan.iterations {
+            if done.is_multiple_of(ITERATIONS_PER_SUBMISSION) || done == plan.iterations {
                 engine.submit(&core::mem::take(&mut r))?;
-                self.host.breathe(engine, done, plan.iterations).await?;
+                if pace.has_event_loop() {
+                    engine.synchronise().await?;
+                    pace.turn(done, plan.iterations).await;
+                }
             }
         }
         let mut losses = Losses::default();
@@ -88,7 +95,7 @@ impl Slam {
 
 /// One iteration, as the paper's figure 2 has it.
 fn record_iteration(
-    r: &mut Recording,
+    r: &mut Commands,
     map: &mut Map,
     scratch: &Scratch,
     plan: &OptimisationPlan,

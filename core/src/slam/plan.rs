@@ -7,6 +7,7 @@ use crate::{
     map::{Batch, Rates, SemanticSupervision, WINDOW_MAX},
 };
 use alloc::{collections::BTreeSet, vec::Vec};
+use mte_slam_shaders::random::salt;
 
 /// Keyframes that every window holds while frames come in: the current one and the two before.
 const RECENT: usize = 3;
@@ -230,7 +231,8 @@ impl OptimisationPlan {
                 return n - 1;
             }
             let iteration = self.first_iteration + i;
-            let at = random_u32(self.seed, iteration, step, 22) as usize % chosen.len().max(1);
+            let at = random_u32(self.seed, iteration, step, salt::SEMANTIC_KEYFRAME) as usize;
+            let at = at % chosen.len().max(1);
             chosen.iter().nth(at).copied().unwrap_or(n - 1)
         };
         (0..due).map(|step| self.slots[frame(step)]).collect()
@@ -297,7 +299,7 @@ fn draw_window(
 ) -> BTreeSet<usize> {
     let mut draw = 0;
     while window.len() < size && !others.is_empty() {
-        let k = random_u32(seed, iteration, draw, 21) as usize % others.len();
+        let k = random_u32(seed, iteration, draw, salt::WINDOW_KEYFRAME) as usize % others.len();
         window.insert(others.swap_remove(k));
         draw += 1;
     }

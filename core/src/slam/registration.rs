@@ -1,14 +1,15 @@
 //! What the odometry finds out late: where colour lies on depth, and poses that its keyframes move.
 use super::{Slam, SlamError};
-use crate::track::odometry::ColourRegistration;
-use crate::{config::Tracker, frame::Frame, recording::Recording};
+use crate::{
+    commands::Commands, config::Tracker, frame::Frame, track::odometry::ColorRegistration,
+};
 use alloc::{borrow::Cow, vec::Vec};
 
 impl Slam {
     /// Where the map takes the colour image to lie on the depth image: what the odometry has found,
     /// the identity as long as nothing speaks against it (and with true poses, where no odometry
     /// runs).
-    pub fn colour_registration(&self) -> ColourRegistration {
+    pub fn color_registration(&self) -> ColorRegistration {
         self.registration
     }
 
@@ -23,20 +24,20 @@ impl Slam {
     /// resampled and stored again. What the map has already learnt from them fades as later
     /// iterations draw from the corrected images.
     pub(super) async fn follow_registration(&mut self, frame: usize) -> Result<(), SlamError> {
-        let found = self.odometer.colour_registration();
+        let found = self.odometer.color_registration();
         if found == self.registration {
             return Ok(());
         }
         self.registrations.push((frame, found));
         // The stored images have the former registration applied.
-        let change = ColourRegistration { scale: found.scale / self.registration.scale };
+        let change = ColorRegistration { scale: found.scale / self.registration.scale };
         self.registration = found;
         let camera = self.info.camera;
         let slots: Vec<u32> = self.keyframes.iter().map(|k| k.slot).collect();
         for slot in slots {
             let (engine, map, _) = self.mapped()?;
             let image = map.frames.read_color(engine, slot).await?;
-            let mut r = Recording::default();
+            let mut r = Commands::default();
             map.frames.upload_color(&mut r, slot, &change.resampled(&image, &camera));
             engine.submit(&r)?;
         }

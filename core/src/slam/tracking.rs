@@ -1,6 +1,9 @@
 //! Locating a frame: odometry, then refinement against the field.
-use super::{PoseEstimate, Slam, SlamError, TrackingStatus, points::sample_points};
+use super::{
+    PoseEstimate, Slam, SlamError, TrackingStatus, points::sample_points, report::Tracked,
+};
 use crate::{
+    commands::Commands,
     config::Tracker,
     frame::Frame,
     kernels::{
@@ -9,23 +12,11 @@ use crate::{
     },
     map::{Batch, SemanticSupervision, passes, pose_from_words},
     pose::Pose,
-    recording::Recording,
     track::{
         gauss_newton::{self, Guard},
         odometry::RgbdPyramid,
     },
 };
-
-/// A frame that has been tracked.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Tracked {
-    /// How its pose came about.
-    pub status: TrackingStatus,
-    /// Its pose.
-    pub world_from_camera: Pose,
-    /// The odometer took the frame as a reference, so the map should have it, too.
-    pub is_reference: bool,
-}
 
 impl Slam {
     /// Adds the frame's pose to the trajectory.
@@ -67,7 +58,7 @@ impl Slam {
     /// Odometry against keyframes of its own, then refinement against the map.
     async fn locate(&mut self, frame: &Frame) -> Result<Tracked, SlamError> {
         let first = self.frames.is_empty();
-        let config = self.odometer.config().pyramid;
+        let config = self.odometer.config().pyramid.clone();
         let pyramid = RgbdPyramid::new(frame, &self.info.camera, self.info.depth_unit_m, &config)?;
         let start = first.then(|| frame.truth.unwrap_or(Pose::IDENTITY));
         let found = self.odometer.track(pyramid, start)?;
@@ -112,7 +103,7 @@ impl Slam {
         let (camera, unit, seed) = (self.info.camera, self.info.depth_unit_m, self.config.seed);
         let points = sample_points(frame, &camera, unit, t.align_pixels as usize, seed);
         let (engine, map, scratch) = self.mapped()?;
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         passes::upload_pixels(&mut r, scratch, &points);
         engine.submit(&r)?;
         let guard = Guard { offered: points.len(), ..Guard::default() };
@@ -139,7 +130,7 @@ impl Slam {
         let first_iteration = self.iteration;
         self.iteration += t.render_iterations + 1;
         let (engine, map, scratch) = self.mapped()?;
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         map.frames.upload_frame(&mut r, slot, frame);
         map.frames.upload_pose(&mut r, slot, start);
         scratch.upload_window(&mut r, &[(slot, false)]);
