@@ -4,7 +4,7 @@ mod evaluation;
 mod recording;
 mod suite;
 
-use crate::resume::Invocation;
+use crate::invocation::Invocation;
 pub use evaluation::{CullChoice, EvalArgs, InferenceChoice, MiouProtocol};
 pub use recording::{
     ClassArgs, ColorChoice, ConvertArgs, InspectArgs, SelectionArgs, SensorArgs, TargetLayout,

@@ -3,21 +3,19 @@
 #![forbid(unsafe_code)]
 
 mod args;
-mod class_truth;
+mod command_line;
 mod commands;
 mod configuration;
 mod engine;
 mod errors;
-mod evaluation;
 mod input;
+mod invocation;
 mod memory;
-mod mesh_evaluation;
 mod novel;
 mod output;
 mod pipeline;
 mod progress;
 mod record;
-mod report;
 mod resume;
 mod screen;
 mod server;
@@ -26,11 +24,12 @@ mod suite;
 mod synthetic;
 
 use args::{Cli, Command};
+use mte_slam_report::{class_truth, evaluation, mesh_evaluation};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     suite::process::end_with_parent();
-    match resume::command_line().and_then(|cli| follow(&cli)) {
+    match command_line::command_line().and_then(|cli| follow(&cli)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");

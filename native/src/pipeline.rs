@@ -27,6 +27,7 @@ use anyhow::{Context, Result};
 use glam::DVec3;
 use mte_slam_core::slam::{FrameReport, PoseEstimate, Slam, TrackingStatus, View};
 use mte_slam_mesh::Mesh;
+pub use mte_slam_report::evaluation::score_view;
 use mte_slam_types::{
     classes::ClassTable,
     frame::{Frame, SequenceInfo},
@@ -200,7 +201,8 @@ fn work(
                 let depth_views = output.mesh_views;
                 let wanted = MeshProtocols { depth_views, ..MeshProtocols::default() };
                 let sequence = sequence.as_mut();
-                mesh_evaluation::score(mesh, truth, sequence, &wanted, &mut metrics, screen);
+                screen.note("comparing the mesh with the true one");
+                mesh_evaluation::score(mesh, truth, sequence, &wanted, &mut metrics);
             }
             Err(reason) => {
                 metrics.absent.insert("mesh", reason);
@@ -486,19 +488,6 @@ pub fn render_frame(
     let view = block_on(slam.render(&estimate.world_from_camera, &camera))
         .with_context(|| format!("rendering frame {}", estimate.frame))?;
     Ok((frame, view))
-}
-
-/// Score a view, whose classes become those of the truth's table. Gives back the frame as the map
-/// was trained with it, and its true labels.
-pub fn score_view(
-    scores: &mut ViewScores,
-    frame: &Frame,
-    view: &mut View,
-) -> Result<(Frame, Option<Vec<u8>>)> {
-    view.class = scores.truth().of_map(&view.class);
-    let (trained, labels) = scores.registered(frame)?;
-    scores.add(&trained, view, labels.as_deref())?;
-    Ok((trained.into_owned(), labels))
 }
 
 /// Legend, and with figures the confusion matrix and the table of classes.

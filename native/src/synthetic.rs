@@ -1,8 +1,9 @@
 //! Built-in sequences as files.
-use crate::{input, novel, output::new_folder::NewFolder};
+use crate::{input, output::new_folder::NewFolder};
 use anyhow::{Context, Result};
 use mte_slam_dataset::{ColorFormat, RecordingWriter, ReplicaWriter};
 use mte_slam_mesh::write_ply;
+use mte_slam_report::novel;
 use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
 use mte_slam_types::{frame::SequenceInfo, sequence::Sequence};
 use std::path::Path;

@@ -5,6 +5,8 @@
 //! half a result nor a mixture of two: the staging folder, and an output folder that was made for
 //! the run, are removed on drop.
 use anyhow::{Context, Result, bail};
+use mte_slam_report::files::not_written;
+pub use mte_slam_report::files::replace_file;
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -12,7 +14,7 @@ use std::{
 
 const STAGING: &str = ".partial";
 /// What an interrupted run goes on from.
-const RESUME: &str = crate::resume::FOLDER;
+const RESUME: &str = mte_slam_report::files::RESUME_FOLDER;
 /// Files that mark a folder as one of ours; results of a run that was killed while they were put in
 /// place lie beside what it goes on from.
 const MARKERS: [&str; 3] = ["metrics.json", "config.toml", RESUME];
@@ -153,21 +155,6 @@ impl Drop for OutputFolder {
     }
 }
 
-/// Write one file of an existing folder: to a temporary name first, then renamed.
-pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<()> {
-    let mut temporary = path.as_os_str().to_owned();
-    temporary.push(".tmp");
-    let temporary = PathBuf::from(temporary);
-    if let Some(parent) = path.parent() {
-        fs::create_dir_all(parent).with_context(|| not_written(path))?;
-    }
-    let written = fs::write(&temporary, bytes).and_then(|()| fs::rename(&temporary, path));
-    if written.is_err() {
-        let _ = fs::remove_file(&temporary);
-    }
-    written.with_context(|| not_written(path))
-}
-
 fn sorted_entries(folder: &Path) -> Result<Vec<String>> {
     let mut names = Vec::new();
     for entry in fs::read_dir(folder).with_context(|| unwritable(folder))? {
@@ -189,10 +176,6 @@ fn unwritable(path: &Path) -> String {
         "{}: the output folder cannot be written; choose another with --out or change its rights",
         path.display()
     )
-}
-
-fn not_written(path: &Path) -> String {
-    format!("{}: cannot be written (disk full, or no right to?)", path.display())
 }
 
 #[cfg(test)]

@@ -3,12 +3,15 @@
 //! A run that ends in a crash, or that the system ends for want of memory, takes nothing else with
 //! it; and runs do not outlive the suite: each holds one end of a pipe, and ends when the other end
 //! is gone, however this process came to its end.
-use super::{
-    plan::{FAILURE, Run},
-    run_file,
-};
-use crate::{output::folder::replace_file, progress::Progress};
+use crate::progress::Progress;
 use anyhow::{Context, Result};
+use mte_slam_report::{
+    files::replace_file,
+    suite::{
+        plan::{FAILURE, Run, STARTED},
+        run_file,
+    },
+};
 use std::{
     collections::VecDeque,
     fs,
@@ -22,8 +25,6 @@ use std::{
 pub const TIED: &str = "MTE_SLAM_TIED";
 /// What a run has said, in its folder.
 pub const LOG: &str = "log.txt";
-/// How a run was started, in its folder.
-pub const STARTED: &str = "started.json";
 /// How often children are looked at.
 const PAUSE: Duration = Duration::from_millis(100);
 

@@ -1,5 +1,5 @@
 //! A mesh against the true one, by the protocols of the field.
-use crate::{output::metrics::Metrics, screen::Screen};
+use crate::metrics::Metrics;
 use anyhow::{Context, Result, bail};
 use mte_slam_mesh::{CullProtocol, DepthRenderer, Keep, Mesh, Visibility};
 use mte_slam_metrics::{
@@ -113,9 +113,7 @@ pub fn score(
     sequence: &mut dyn Sequence,
     protocols: &MeshProtocols,
     metrics: &mut Metrics,
-    screen: Screen,
 ) -> Option<ProtocolViews> {
-    screen.note("comparing the mesh with the true one");
     match compare(ours, truth, sequence, protocols, metrics) {
         Ok(views) => Some(views),
         Err(reason) => {

@@ -1,7 +1,7 @@
-//! The figures of a run, by the core's metrics.
+//! The figures of a trajectory and of rendered views.
 use crate::{
     class_truth::ClassTruth,
-    output::metrics::{Metrics, RenderRecord, SemanticFigures},
+    metrics::{Metrics, RenderRecord, SemanticFigures},
 };
 use anyhow::{Context, Result};
 use mte_slam_core::slam::{PoseEstimate, View};
@@ -172,4 +172,20 @@ impl ViewScores {
             classes_by: None,
         });
     }
+}
+
+/// Scores a view, whose classes become those of the truth's table. Returns the frame as the map was
+/// trained with it, and its true labels.
+///
+/// # Errors
+/// The true labels cannot be read, or an image has another size than the view.
+pub fn score_view(
+    scores: &mut ViewScores,
+    frame: &Frame,
+    view: &mut View,
+) -> Result<(Frame, Option<Vec<u8>>)> {
+    view.class = scores.truth().of_map(&view.class);
+    let (trained, labels) = scores.registered(frame)?;
+    scores.add(&trained, view, labels.as_deref())?;
+    Ok((trained.into_owned(), labels))
 }

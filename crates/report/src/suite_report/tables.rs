@@ -5,7 +5,7 @@ use super::{
     results::{Results, RunResult},
 };
 use crate::{
-    output::ablation::OverSeeds,
+    ablation::OverSeeds,
     suite::{
         plan::Plan,
         published::{self, Kind},
@@ -404,8 +404,8 @@ pub fn words(path: &str) -> String {
 mod tests {
     use super::*;
     use crate::{
-        report::results::Figure,
-        suite::{file::Suite, plan::DataRoot},
+        suite::{file::Suite, plan::DataRoot, program::tests::Pretend},
+        suite_report::results::Figure,
     };
 
     #[test]
@@ -421,9 +421,9 @@ mod tests {
         let text = "seeds = [1, 2]\npresets = ['fast']\nbenchmark = 'replica'\n\
                     scenes = [{ name = 'a', synthetic = { scene = 'room', frames = 4 } },\n\
                     { name = 'b', synthetic = { scene = 'office', frames = 4 } }]";
-        let suite = Suite::parse("s.toml", "s", text).unwrap();
+        let suite = Suite::parse("s.toml", "s", text, &Pretend).unwrap();
         let data = DataRoot::choose(None, &suite);
-        let plan = Plan::new(suite, std::path::Path::new("out"), &data).unwrap();
+        let plan = Plan::new(suite, std::path::Path::new("out"), &data, &Pretend).unwrap();
         let figure = |run: &RunResult| {
             let scene = if run.scene == "a" { 1.0 } else { 3.0 };
             Figure { value: scene + 0.5 * f64::from(run.seed), protocol: "P in 8 views".to_owned() }

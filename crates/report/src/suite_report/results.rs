@@ -3,11 +3,11 @@
 //! Figures are taken from `metrics.json` as they are: each number below an object with a
 //! `protocol` is one, called by its path. What a later version measures comes along by itself.
 use crate::{
-    output::ablation::OverSeeds,
+    ablation::OverSeeds,
+    files::{RESUME_FOLDER, read_json},
     suite::{
         file::Benchmark,
-        plan::{Plan, Run, State, read_json},
-        process,
+        plan::{Plan, Run, STARTED, State},
     },
 };
 use anyhow::Result;
@@ -135,7 +135,7 @@ impl Results {
             }
         }
         Results {
-            program: format!("mte-slam {}", env!("CARGO_PKG_VERSION")),
+            program: plan.program.clone(),
             suite: plan.suite.name.clone(),
             benchmark: plan.suite.benchmark,
             runs,
@@ -257,8 +257,8 @@ impl RunResult {
 fn read_run(run: &Run) -> RunResult {
     let mut result = RunResult::new(run);
     // A report takes finished runs of another version as they are, and says so.
-    let finished = run.folder.join("metrics.json").is_file()
-        && !run.folder.join(crate::resume::FOLDER).exists();
+    let finished =
+        run.folder.join("metrics.json").is_file() && !run.folder.join(RESUME_FOLDER).exists();
     if !finished {
         (result.state, result.reason) = match run.state() {
             Ok(State::Interrupted) => ("interrupted", None),
@@ -285,7 +285,7 @@ fn fill(result: &mut RunResult, folder: &Path) -> Result<()> {
     result.config_hash = text(&json["configuration"]["hash"]);
     result.engine = json["engine"].clone();
     result.sequence = json["sequence"].clone();
-    result.started = read_json(&folder.join(process::STARTED)).unwrap_or_default();
+    result.started = read_json(&folder.join(STARTED)).unwrap_or_default();
     result.modules = modules(&folder.join("config.toml"));
     result.lost_frames = json["lost_frames"].as_array().map_or(0, Vec::len);
     let warnings = json["warnings"].as_array();

@@ -1,7 +1,7 @@
 //! Pictures of a report: files made small and put into the page, and meshes in the colours of their
 //! error.
 use super::{document::escape, results::RunResult};
-use crate::output::{colormap::turbo, pictures::Canvas};
+use crate::draw::{colormap::turbo, pictures::Canvas};
 use anyhow::{Context, Result, bail};
 use glam::{DMat3, DVec3};
 use image::{DynamicImage, ImageFormat, imageops::FilterType};

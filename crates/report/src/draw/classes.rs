@@ -1,8 +1,6 @@
 //! What there is to see of the classes: `legend.png`, `confusion.png` and `classes.csv`.
-use super::{
-    metrics::SemanticFigures,
-    pictures::{Canvas, class_color},
-};
+use super::pictures::{Canvas, class_color};
+use crate::metrics::SemanticFigures;
 use anyhow::Result;
 use mte_slam_metrics::ConfusionMatrix;
 use mte_slam_types::classes::ClassTable;

@@ -1,6 +1,6 @@
 //! Charts as SVG, in the page's colours: classes `s0`, `s1`, ... for series, `axis`, `grid`, `truth`.
 use super::document::escape;
-use crate::output::plot::nice_step;
+use crate::draw::plot::nice_step;
 use glam::DVec3;
 use std::fmt::Write;
 
