@@ -28,6 +28,7 @@ use glam::DVec3;
 use mte_slam_core::slam::{FrameReport, PoseEstimate, Slam, TrackingStatus, View};
 use mte_slam_mesh::Mesh;
 pub use mte_slam_report::evaluation::score_view;
+use mte_slam_report::protocol::Protocol;
 use mte_slam_types::{
     classes::ClassTable,
     frame::{Frame, SequenceInfo},
@@ -360,12 +361,8 @@ fn write_anchors(slam: &Slam, folder: &OutputFolder, metrics: &mut Metrics) -> R
     let limit = slam.config().suppressor.anchors;
     let svg = plot::anchors_svg(&slam.info().name, &history, limit);
     folder.write("anchors.svg", svg.as_bytes())?;
-    metrics.anchors = Some(AnchorFigures {
-        protocol: "after each call of the optimisation: last frame, anchors in use, and since the start spawned, dropped, merged",
-        limit,
-        last: *last,
-        history,
-    });
+    metrics.anchors =
+        Some(AnchorFigures { protocol: Protocol::Anchors, limit, last: *last, history });
     Ok(())
 }
 
@@ -566,9 +563,7 @@ fn configuration_record(effective: &Effective) -> Result<ConfigurationRecord> {
 
 fn time_figures(timings: &[Timing], last_optimisation_s: f64, start: Instant) -> TimeFigures {
     TimeFigures {
-        protocol: "wall clock a frame, median and 95th percentile; without reading and decoding \
-                   images, without evaluation, and without the last optimisation, which is given \
-                   apart. The first frame is not tracked; its mapping may compile pipelines",
+        protocol: Protocol::Time,
         tracking: Spread::of(timings.iter().skip(1).map(|t| t.tracking_s)),
         mapping: Spread::of(timings.iter().map(|t| t.mapping_s).filter(|s| *s > 0.0)),
         total: Spread::of(timings.iter().map(|t| t.total_s)),
@@ -584,7 +579,7 @@ fn memory_figures(slam: &Slam) -> MemoryFigures {
         Err(reason) => (None, Some(reason)),
     };
     MemoryFigures {
-        protocol: "host: peak resident set of the whole program, evaluation included (without a hardware adapter it holds the device's buffers, too); device: sum of the engine's buffers, without the driver's own",
+        protocol: Protocol::Memory,
         peak_host_bytes,
         peak_host_unknown,
         device_bytes: slam.memory_bytes() as u64,

@@ -79,6 +79,9 @@ pub struct SurfaceFigures {
 /// Comparison of two meshes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SurfaceReport {
+    /// Id of the protocol, to compare by ([`crate::protocol`]); the caller names how the meshes were
+    /// culled and aligned.
+    pub protocol_id: String,
     /// What the figures mean; the caller adds how the meshes were culled and aligned.
     pub protocol: String,
     /// Samples a mesh.
@@ -190,6 +193,7 @@ pub fn evaluate_surface(
     let accuracy = distances(estimate_points.shapes(), &Bvh::of(triangles(truth)));
     let completion = distances(truth_points.shapes(), &Bvh::of(triangles(estimate)));
     Ok(SurfaceReport {
+        protocol_id: crate::protocol::SURFACE.into(),
         protocol: format!(
             "mesh: {samples} area-weighted samples a mesh, ratio under {} cm",
             threshold_m * 100.0

@@ -2,6 +2,7 @@
 use crate::{
     class_truth::ClassTruth,
     metrics::{Metrics, RenderRecord, SemanticFigures},
+    protocol::Protocol,
 };
 use anyhow::{Context, Result};
 use mte_slam_core::slam::{PoseEstimate, View};
@@ -149,6 +150,7 @@ impl ViewScores {
         metrics.color = self.color.report();
         let scale = self.registration.scale;
         if let (Some(color), false) = (&mut metrics.color, self.registration.is_identity()) {
+            color.protocol_id = Protocol::ColorViews { resampled: true }.id();
             color.protocol += &format!(
                 "; against the input resampled to the depth camera, as the map was trained \
                  (colour focal length {scale:.3} of the depth camera's, found from the images)"
@@ -166,7 +168,7 @@ impl ViewScores {
         }
         metrics.warnings.extend(self.truth.warnings());
         metrics.renders = Some(RenderRecord {
-            protocol: "at estimated poses, without depth input",
+            protocol: Protocol::Renders,
             frames: self.frames.clone(),
             unlabelled_id,
             classes_by: None,

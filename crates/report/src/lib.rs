@@ -3,7 +3,7 @@
 //!
 //! - [`evaluation`], [`class_truth`], [`mesh_evaluation`], [`novel`]: figures of a trajectory, of
 //!   rendered views and their classes, of a mesh, and of views that a run never saw;
-//! - [`metrics`]: `metrics.json` and the table that people read;
+//! - [`protocol`]: what a figure means, as an id and a sentence; [`metrics`]: `metrics.json` and the table that people read;
 //! - [`ablation`]: `ablation.json` and `ablation.md`;
 //! - [`suite`]: many runs over scenes, seeds, presets and ablations, and [`suite_report`], what a
 //!   suite has measured, as JSON, CSV, HTML and Markdown;
@@ -24,6 +24,7 @@ pub mod metrics;
 pub mod metrics_line;
 mod metrics_table;
 pub mod novel;
+pub mod protocol;
 pub mod suite;
 pub mod suite_report;
 mod text_table;

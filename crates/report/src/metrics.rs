@@ -1,6 +1,6 @@
 //! `metrics.json`: every figure with its unit in the key and its protocol beside it, and the table
 //! that people read at the end of a run.
-use crate::timings::Spread;
+use crate::{protocol::Protocol, timings::Spread};
 use mte_slam_core::device::AnchorCounts;
 use mte_slam_metrics::{
     AteReport, BoundaryReport, DepthReport, MeshDepthReport, PsnrReport, SMALL_SHARE_PERCENT,
@@ -87,7 +87,8 @@ pub struct Metrics {
 #[derive(Debug, Clone, Serialize)]
 pub struct AnchorFigures {
     /// What the figures mean.
-    pub protocol: &'static str,
+    #[serde(flatten)]
+    pub protocol: Protocol,
     /// Most anchors there may be.
     pub limit: u32,
     /// At the end.
@@ -225,7 +226,8 @@ impl SemanticFigures {
 #[derive(Debug, Clone, Serialize)]
 pub struct SniFigures {
     /// What the figures mean.
-    pub protocol: &'static str,
+    #[serde(flatten)]
+    pub protocol: Protocol,
     /// The frame.
     pub frame: usize,
     /// Mean IoU \[%\] over the classes with a non-empty union.
@@ -249,6 +251,8 @@ pub struct InferenceFigures {
 /// Views from poses that the map never saw.
 #[derive(Debug, Clone, Serialize)]
 pub struct NovelFigures {
+    /// Id of the protocol.
+    pub protocol_id: String,
     /// Where the views and their truth come from.
     pub protocol: String,
     /// Number of views.
@@ -265,7 +269,8 @@ pub struct NovelFigures {
 #[derive(Debug, Clone, Serialize)]
 pub struct RenderRecord {
     /// How the pictures were made.
-    pub protocol: &'static str,
+    #[serde(flatten)]
+    pub protocol: Protocol,
     /// Indices of the frames.
     pub frames: Vec<usize>,
     /// Id in the class pictures where there is no class.
@@ -279,7 +284,8 @@ pub struct RenderRecord {
 #[derive(Debug, Clone, Serialize)]
 pub struct TimeFigures {
     /// What is counted.
-    pub protocol: &'static str,
+    #[serde(flatten)]
+    pub protocol: Protocol,
     /// Tracking.
     pub tracking: Spread,
     /// Mapping, over the frames that were mapped.
@@ -311,7 +317,8 @@ pub struct SavingFigures {
 #[derive(Debug, Clone, Serialize)]
 pub struct MemoryFigures {
     /// What is counted.
-    pub protocol: &'static str,
+    #[serde(flatten)]
+    pub protocol: Protocol,
     /// Peak resident memory of the process.
     pub peak_host_bytes: Option<u64>,
     /// Why that is unknown.

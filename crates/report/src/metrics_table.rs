@@ -98,7 +98,7 @@ impl Metrics {
         }
         if let Some(s) = &self.semantics_sni {
             let value = format!("{:.2}, {:.2} %", s.miou_percent, s.pixel_accuracy_percent);
-            row("SNI-SLAM's mIoU, pixels", value, s.protocol);
+            row("SNI-SLAM's mIoU, pixels", value, s.protocol.sentence());
         }
         if let Some(s) = &self.semantics_by_inference {
             let r = &s.semantics.report;
@@ -146,7 +146,7 @@ impl Metrics {
         }
         if let Some(t) = &self.time {
             let of = |s: &Spread| format!("{:.3} s (p95 {:.3})", s.median_s, s.p95_s);
-            row("tracking a frame", of(&t.tracking), t.protocol);
+            row("tracking a frame", of(&t.tracking), t.protocol.sentence());
             row("mapping a mapped frame", of(&t.mapping), "");
             row("total a frame", of(&t.total), "");
             row("last optimisation", format!("{:.1} s", t.last_optimisation_s), "");
@@ -155,7 +155,7 @@ impl Metrics {
         if let Some(m) = &self.memory {
             let mib = |b: u64| format!("{:.0} MiB", b as f64 / f64::from(1 << 20));
             let host = m.peak_host_bytes.map_or("unknown".to_owned(), mib);
-            row("peak host memory", host, m.protocol);
+            row("peak host memory", host, m.protocol.sentence());
             row("peak device buffers", mib(m.peak_device_bytes), "");
         }
         row("lost frames", lost_text(&self.lost_frames), "");

@@ -4,6 +4,7 @@ use crate::{
     class_truth::ClassTruth,
     evaluation::{ViewScores, score_view},
     metrics::{InferenceFigures, Metrics, NovelFigures, SniFigures},
+    protocol::Protocol,
 };
 use anyhow::{Context, Result};
 use mte_slam_core::{config::Inference, slam::Slam};
@@ -94,6 +95,7 @@ pub fn near_frames(
     );
     let mut views = views.into_iter();
     let next = &mut || Ok(views.next());
+    let protocol = (Protocol::NovelNearFrames, protocol);
     metrics.novel_views = score(slam, &info, truth, next, truth_from_estimate, protocol)?;
     Ok(())
 }
@@ -124,6 +126,7 @@ pub fn of_recording(
         }
         Ok(None)
     };
+    let protocol = (Protocol::NovelRecording, protocol);
     metrics.novel_views = score(slam, &info, truth, next, truth_from_estimate, protocol)?;
     if metrics.novel_views.is_none() {
         metrics.absent.insert("novel_views", format!("{name}: no frame has a true pose"));
@@ -138,7 +141,7 @@ fn score(
     truth: ClassTruth,
     next: &mut dyn FnMut() -> Result<Option<Frame>>,
     truth_from_estimate: Pose,
-    protocol: String,
+    (protocol, sentence): (Protocol, String),
 ) -> Result<Option<NovelFigures>> {
     let estimate_from_truth = truth_from_estimate.inverse();
     let mut scores = ViewScores::new(info, truth, slam.colour_registration());
@@ -157,7 +160,14 @@ fn score(
     let mut figures = Metrics::default();
     scores.report(0, &mut figures);
     let Metrics { depth, color, semantics, .. } = figures;
-    Ok(Some(NovelFigures { protocol, views, depth, color, semantics }))
+    Ok(Some(NovelFigures {
+        protocol_id: protocol.id(),
+        protocol: sentence,
+        views,
+        depth,
+        color,
+        semantics,
+    }))
 }
 
 /// The classes of the frames `rendered`, at estimated poses, by the nearest anchors or the head.
@@ -233,8 +243,7 @@ pub fn sni(
     matrix.add(&labels, &class_truth.of_map(&view.class))?;
     let Some(report) = matrix.report() else { return absent("the first frame has no true labels") };
     metrics.semantics_sni = Some(SniFigures {
-        protocol: "SNI-SLAM's script: the first frame alone, at its true pose and with its true \
-                   depth; for comparison with that paper only",
+        protocol: Protocol::Sni,
         frame: 0,
         miou_percent: report.miou_percent,
         miou_classes: report.miou_classes,
