@@ -2,49 +2,15 @@
 # Builds the page: the WebAssembly package into www/pkg, then www/dist, static files that work from
 # any sub-path. Checks the size budget. Needs Rust with the wasm32 target and Node 20 or newer.
 #
-# MTE_SLAM_TOOLS   where wasm-bindgen is kept (default: the user's cache folder, by version)
+# With wasm-pack on the path, that builds the module (see scripts/web-module.sh).
 set -eu
 cd "$(dirname "$0")/.."
-cache=${MTE_SLAM_TOOLS:-${XDG_CACHE_HOME:-$HOME/.cache}/mte-slam/tools}
 limit_bytes=2500000
 limit_gzip_bytes=900000
 
 say() { echo "build-web: $*"; }
 
-# wasm-bindgen's command must have exactly the library's version.
-version=$(sed -n '/^name = "wasm-bindgen"$/{n;s/version = "\(.*\)"/\1/p;}' Cargo.lock)
-bindgen=$(command -v wasm-bindgen || true)
-if [ -z "$bindgen" ] || [ "$("$bindgen" --version)" != "wasm-bindgen $version" ]; then
-    bindgen=$cache/wasm-bindgen-$version/bin/wasm-bindgen
-    if [ ! -x "$bindgen" ]; then
-        say "installing wasm-bindgen-cli $version into $cache (once)"
-        CARGO_TARGET_DIR=$cache/build cargo install --quiet wasm-bindgen-cli --version "$version" \
-            --root "$cache/wasm-bindgen-$version"
-        rm -rf "$cache/build"
-    fi
-fi
-
-setup=$(sh ./scripts/wasm-toolchain.sh)
-target=$(
-    eval "$setup"
-    # Every browser that has WebGPU has 128-bit SIMD; it does not change a bit of the results.
-    export CARGO_PROFILE_RELEASE_DEBUG=0 CARGO_PROFILE_RELEASE_LTO=fat \
-        CARGO_PROFILE_RELEASE_CODEGEN_UNITS=1 CARGO_PROFILE_RELEASE_PANIC=abort \
-        CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS="-C target-feature=+simd128 -C llvm-args=-inline-threshold=25" \
-        CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}/web"
-    # What runs once a frame at most is made small; the kernels' twins are not.
-    set --
-    for crate in core types odometry dataset mesh metrics synth; do
-        set -- "$@" --config "profile.release.package.mte-slam-$crate.opt-level=2"
-    done
-    for crate in mte-slam-web serde_json zip zune-jpeg image png fdeflate miniz_oxide wgpu js-sys serde-wasm-bindgen; do
-        set -- "$@" --config "profile.release.package.$crate.opt-level='s'"
-    done
-    cargo build --locked --release "$@" -p mte-slam-web --target wasm32-unknown-unknown >&2
-    echo "$CARGO_TARGET_DIR"
-)
-rm -rf www/pkg
-"$bindgen" --target web --out-dir www/pkg "$target/wasm32-unknown-unknown/release/mte_slam_web.wasm"
+./scripts/web-module.sh www/pkg
 
 cd www
 [ -d node_modules ] && [ node_modules/.package-lock.json -nt package-lock.json ] || npm ci --no-fund --no-audit

@@ -9,10 +9,10 @@ cd "$(dirname "$0")/.."
 
 if ! command -v snakemake > /dev/null 2>&1; then
     if [ "${MTE_SLAM_REQUIRE_SNAKEMAKE:-0}" = 1 ]; then
-        echo "no snakemake; 'pip install snakemake' brings it" >&2
+        echo "no snakemake; 'pip install -r tests/requirements.txt' brings it" >&2
         exit 1
     fi
-    echo "SKIPPED: the workflow; there is no snakemake ('pip install snakemake' brings it)."
+    echo "SKIPPED: the workflow; there is no snakemake ('pip install -r tests/requirements.txt' brings it)."
     exit 0
 fi
 if [ -z "${MTE_SLAM:-}" ]; then

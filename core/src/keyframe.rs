@@ -2,6 +2,7 @@
 use crate::{camera::Camera, frame::Frame, kernels::shared::random_u32, pose::Pose};
 use alloc::vec::Vec;
 use glam::DVec3;
+use mte_slam_shaders::random::salt;
 
 /// A frame whose images are kept on the device.
 #[derive(Clone, Debug)]
@@ -29,7 +30,7 @@ pub fn sample_points(
     let mut out = Vec::with_capacity(nx * ny);
     for j in 0..ny {
         for i in 0..nx {
-            let r = random_u32(seed, frame.index as u32, (j * nx + i) as u32, 11);
+            let r = random_u32(seed, frame.index as u32, (j * nx + i) as u32, salt::KEYFRAME_POINT);
             let jitter = |bits: u32| f64::from(bits & 0xffff) / 65536.0;
             let u = (((i as f64 + jitter(r)) * step) as usize).min(w - 1);
             let v = (((j as f64 + jitter(r >> 16)) * step) as usize).min(h - 1);

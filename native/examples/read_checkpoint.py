@@ -12,12 +12,15 @@ import sys
 import numpy as np
 from safetensors import safe_open
 
+# Compared with the program's own by its tests.
+FORMAT = "mte-slam-6"
+
 
 def main(path, trajectory=None):
     with safe_open(path, framework="numpy") as f:
         metadata = f.metadata()
-        if metadata["format"] != "mte-slam-5":
-            sys.exit(f"{path}: format: found {metadata['format']}, expected mte-slam-5")
+        if metadata["format"] != FORMAT:
+            sys.exit(f"{path}: format: found {metadata['format']}, expected {FORMAT}")
         tensors = {name: f.get_tensor(name) for name in f.keys()}
     state = json.loads(metadata["state"])
     print("configuration", metadata["configuration"], "data", metadata["data"])

@@ -8,6 +8,7 @@ mod commands;
 mod configuration;
 mod engine;
 mod errors;
+mod host;
 mod input;
 mod invocation;
 mod memory;
@@ -16,12 +17,16 @@ mod output;
 mod pipeline;
 mod progress;
 mod record;
+mod restore;
+mod results;
 mod resume;
 mod screen;
 mod server;
 mod source;
+mod steps;
 mod suite;
 mod synthetic;
+mod views;
 
 use args::{Cli, Command};
 use mte_slam_report::{class_truth, evaluation, mesh_evaluation};
@@ -56,5 +61,6 @@ fn follow(cli: &Cli) -> anyhow::Result<()> {
         Command::Ablate(args) => commands::ablate::run(args, screen),
         Command::Bench(args) => commands::bench::run(args, screen),
         Command::Shaders(args) => commands::shaders::run(args, screen),
+        Command::Settings(args) => commands::settings::run(args, screen),
     }
 }

@@ -32,7 +32,7 @@ impl Recorded {
     /// When the CPU engine fails: there is nothing to compare with then.
     pub fn make() -> Recorded {
         let kernels = kernels::all().iter().map(|kernel| {
-            let cases = cases(kernel.name);
+            let cases = cases(kernel.interface.name);
             let mut engine = Engine::cpu();
             let run = |case: &Case| block_on(body::run_case(&mut engine, case));
             let results: Result<Vec<_>, EngineError> = cases.iter().map(run).collect();
@@ -83,7 +83,7 @@ impl Recorded {
         let mut all = Vec::new();
         for kernel in kernels::all() {
             // Names, tolerances and sizes are this program's; inputs and results are the other's.
-            let mut cases = cases(kernel.name);
+            let mut cases = cases(kernel.interface.name);
             if take(1)?[0] as usize != cases.len() {
                 return None;
             }
@@ -96,7 +96,7 @@ impl Recorded {
                     *buffer = take(n)?.to_vec();
                 }
                 let mut result = Vec::new();
-                for _ in kernel.bindings {
+                for _ in kernel.interface.bindings {
                     let n = take(1)?[0] as usize;
                     result.push(take(n)?.to_vec());
                 }

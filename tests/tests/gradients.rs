@@ -1,4 +1,4 @@
-//! Analytic gradients against central differences, through the recordings of `Device` (layers,
+//! Analytic gradients against central differences, through the passes over a map (layers,
 //! offsets and dispatch sizes included) and through single kernels.
 //!
 //! Hard cut-offs are off (no lightest interval, no smallest gradient) and the sharpness is low.
@@ -7,29 +7,30 @@
 //! derivatives along whole directions, where a kink is one term of many, may not.
 use glam::DVec3;
 use mte_slam_core::{
+    commands::Commands,
     config::{Config, Head, LossConfig},
-    device::{Batch, Device, Guidance, Rates, Trained},
     engine::Engine,
     kernels::{
         align_points::ALIGN_POINTS,
         sample_rays::SAMPLE_RAYS,
         shared::{FLAG_GUIDED, FLAG_MAP, FLAG_POSE},
     },
-    layout::{GEOMETRY_FLOATS, HEAD_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS},
-    recording::Recording,
+    layout::{HEAD_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_POSE},
+    map::{Batch, ParameterTensor, Rates, SemanticSupervision},
+    shaders::decoders::{COLOR, GEOMETRY, SEMANTIC},
 };
 use mte_slam_tests::{
     TestRandom,
     cases::pixels,
     f32_words,
     fixture::{self, CLASSES, DEPTH_UNIT_M, FRAMES, Options, State, run_words, words},
+    rig::Rig,
 };
 use mte_slam_types::{
     camera::Camera,
     frame::{Bounds, Frame},
     pose::Pose,
 };
-use pollster::block_on;
 use std::ops::Range;
 
 const RAYS_PER_FRAME: u32 = 40;
@@ -67,7 +68,7 @@ fn config() -> Config {
 }
 
 struct Problem {
-    device: Device,
+    rig: Rig,
     loss: LossConfig,
     flags: u32,
     rays_per_frame: u32,
@@ -80,13 +81,12 @@ impl Problem {
 
     fn of(engine: Engine, loss: LossConfig, config: Config) -> Problem {
         let camera: Camera = fixture::camera();
-        let device =
-            Device::new(engine, &config, camera, DEPTH_UNIT_M, CLASSES, fixture::shape()).unwrap();
+        let rig = Rig::new(engine, &config, camera, 0, fixture::shape());
         let flags = FLAG_GUIDED | FLAG_MAP | FLAG_POSE;
-        let mut problem = Problem { device, loss, flags, rays_per_frame: RAYS_PER_FRAME };
+        let mut problem = Problem { rig, loss, flags, rays_per_frame: RAYS_PER_FRAME };
         let state = State::new(&Options::default());
-        let d = &mut problem.device;
-        let mut r = Recording::new();
+        let d = &mut problem.rig;
+        let mut r = Commands::new();
         for (tensor, name) in [
             (d.geometry, "planes_geometry"),
             (d.appearance, "planes_appearance"),
@@ -100,7 +100,7 @@ impl Problem {
             d.upload_pose(&mut r, slot, &fixture::pose(slot));
         }
         d.upload_window(&mut r, &[(2, false), (0, false), (1, false)]);
-        d.engine.submit(&r).unwrap();
+        d.submit(&r);
         problem
     }
 
@@ -114,8 +114,9 @@ impl Problem {
             loss,
             iteration: 5,
             first: 0,
+            camera: None,
             rare_share: 0.0,
-            guidance: Guidance::default(),
+            supervision: SemanticSupervision::default(),
         }
     }
 
@@ -123,37 +124,41 @@ impl Problem {
     fn loss(&mut self) -> f64 {
         let loss = self.loss.clone();
         let batch = self.batch(&loss);
-        let mut r = Recording::new();
-        self.device.record_forward(&mut r, &batch);
-        self.device.record_backward(&mut r, &batch);
-        self.device.engine.submit(&r).unwrap();
+        let mut r = Commands::new();
+        self.rig.record_forward(&mut r, &batch);
+        self.rig.record_backward(&mut r, &batch);
+        self.rig.submit(&r);
         let rays = FRAMES * self.rays_per_frame;
-        let out = block_on(self.device.read_ray_out(rays)).unwrap();
+        let out = self.rig.read_ray_out(rays);
         total_loss(&out, &loss)
     }
 
-    fn read(&mut self, buffer: mte_slam_core::recording::BufferId, floats: usize) -> Vec<f32> {
-        block_on(self.device.engine.read_as(buffer, 0, floats)).unwrap()
+    fn read(
+        &mut self,
+        buffer: impl Into<mte_slam_core::commands::BufferId>,
+        floats: usize,
+    ) -> Vec<f32> {
+        self.rig.read(buffer, floats)
     }
 
-    fn set(&mut self, tensor: Trained, values: &[f32]) {
-        let mut r = Recording::new();
+    fn set(&mut self, tensor: ParameterTensor, values: &[f32]) {
+        let mut r = Commands::new();
         r.upload(tensor.values, 0, values);
-        self.device.engine.submit(&r).unwrap();
+        self.rig.submit(&r);
     }
 
     /// One step with rate 0: Adam's first moments are a tenth of the gradients afterwards.
     fn gradients(&mut self) -> [Vec<f32>; 4] {
         let loss = self.loss.clone();
         let batch = self.batch(&loss);
-        let mut r = Recording::new();
-        self.device.record_forward(&mut r, &batch);
-        self.device.record_backward(&mut r, &batch);
-        self.device.record_pose_step(&mut r, &batch, 0.0, 0.0, true);
-        self.device.record_step(&mut r, &batch, Rates { planes: 0.0, decoders: 0.0 });
-        self.device.engine.submit(&r).unwrap();
-        assert_eq!(block_on(self.device.read_status()).unwrap(), 0, "saturated or not finite");
-        let d = &self.device;
+        let mut r = Commands::new();
+        self.rig.record_forward(&mut r, &batch);
+        self.rig.record_backward(&mut r, &batch);
+        self.rig.record_pose_step(&mut r, &batch, [0.0, 0.0], true);
+        self.rig.record_step(&mut r, &batch, Rates { planes: 0.0, decoders: 0.0 });
+        self.rig.submit(&r);
+        assert_eq!(self.rig.read_status(), 0, "saturated or not finite");
+        let d = &self.rig;
         [d.geometry, d.appearance, d.semantic, d.decoders].map(|t| {
             let moments = self.read(t.moment1, t.floats);
             moments.iter().map(|m| m * 10.0).collect()
@@ -187,7 +192,13 @@ fn losses() -> LossConfig {
 
 /// Compares a part of a tensor's gradient with differences of the loss: single parameters with
 /// the largest gradients, and directions.
-fn check(problem: &mut Problem, tensor: Trained, gradient: &[f32], part: Range<usize>, name: &str) {
+fn check(
+    problem: &mut Problem,
+    tensor: ParameterTensor,
+    gradient: &[f32],
+    part: Range<usize>,
+    name: &str,
+) {
     let values = problem.read(tensor.values, tensor.floats);
     let largest = part.clone().map(|i| gradient[i].abs()).fold(0.0, f32::max);
     assert!(largest > 1e-5, "{name}: no gradient ({largest})");
@@ -240,18 +251,19 @@ fn geometry_planes_and_decoder() {
     // The gradient of the classes stops at the interval weights by design.
     let mut problem = Problem::new(Engine::cpu(), LossConfig { semantic: 0.0, ..losses() });
     let [geometry, _, _, decoders] = problem.gradients();
-    let d = &problem.device;
+    let d = &problem.rig;
     let (planes, weights) = (d.geometry, d.decoders);
     let fine = d.shape.geometry[1][3] as usize * 16;
     check(&mut problem, planes, &geometry, 0..fine, "coarse geometry planes");
     check(&mut problem, planes, &geometry, fine..geometry.len(), "fine geometry planes");
+    let [first, second, last] = GEOMETRY;
     for (name, part) in [
-        ("geometry layer 1", 0..512),
-        ("geometry bias 1", 512..528),
-        ("geometry layer 2", 528..784),
-        ("geometry bias 2", 784..800),
-        ("geometry layer 3", 800..816),
-        ("geometry bias 3", 816..817),
+        ("geometry layer 1", first.weight_range()),
+        ("geometry bias 1", first.bias_range()),
+        ("geometry layer 2", second.weight_range()),
+        ("geometry bias 2", second.bias_range()),
+        ("geometry layer 3", last.weight_range()),
+        ("geometry bias 3", last.bias_range()),
     ] {
         check(&mut problem, weights, &decoders, part, name);
     }
@@ -261,16 +273,15 @@ fn geometry_planes_and_decoder() {
 fn appearance_and_colour_decoder() {
     let mut problem = Problem::new(Engine::cpu(), losses());
     let [_, appearance, _, decoders] = problem.gradients();
-    let (planes, weights) = (problem.device.appearance, problem.device.decoders);
-    let fine = problem.device.shape.surface[1][3] as usize * 16;
+    let (planes, weights) = (problem.rig.appearance, problem.rig.decoders);
+    let fine = problem.rig.shape.surface[1][3] as usize * 16;
     check(&mut problem, planes, &appearance, 0..fine, "coarse appearance planes");
     check(&mut problem, planes, &appearance, fine..appearance.len(), "fine appearance planes");
-    let s = GEOMETRY_FLOATS;
     for (name, part) in [
-        ("colour layer 1", s..s + 1024),
-        ("colour bias 1", s + 1024..s + 1056),
-        ("colour layer 2", s + 1056..s + 1184),
-        ("colour bias 2", s + 1184..s + 1188),
+        ("colour layer 1", COLOR[0].weight_range()),
+        ("colour bias 1", COLOR[0].bias_range()),
+        ("colour layer 2", COLOR[1].weight_range()),
+        ("colour bias 2", COLOR[1].bias_range()),
     ] {
         check(&mut problem, weights, &decoders, part, name);
     }
@@ -280,17 +291,17 @@ fn appearance_and_colour_decoder() {
 fn semantic_planes_decoder_and_head() {
     let mut problem = Problem::new(Engine::cpu(), losses());
     let [_, _, semantic, decoders] = problem.gradients();
-    let (planes, weights) = (problem.device.semantic, problem.device.decoders);
-    let fine = problem.device.shape.surface[1][3] as usize * 16;
+    let (planes, weights) = (problem.rig.semantic, problem.rig.decoders);
+    let fine = problem.rig.shape.surface[1][3] as usize * 16;
     check(&mut problem, planes, &semantic, 0..fine, "coarse semantic planes");
     check(&mut problem, planes, &semantic, fine..semantic.len(), "fine semantic planes");
-    let (s, head) = (GEOMETRY_FLOATS, HEAD_FLOATS);
+    let head = HEAD_FLOATS;
     let bias = head + CLASSES as usize * 16;
     for (name, part) in [
-        ("semantic layer 1", s + 1188..s + 2212),
-        ("semantic bias 1", s + 2212..s + 2244),
-        ("semantic layer 2", s + 2244..s + 2756),
-        ("semantic bias 2", s + 2756..s + 2772),
+        ("semantic layer 1", SEMANTIC[0].weight_range()),
+        ("semantic bias 1", SEMANTIC[0].bias_range()),
+        ("semantic layer 2", SEMANTIC[1].weight_range()),
+        ("semantic bias 2", SEMANTIC[1].bias_range()),
         ("class head", head..bias),
         ("class head's bias", bias..bias + CLASSES as usize),
     ] {
@@ -306,7 +317,7 @@ fn per_sample_head_and_semantic_planes() {
     let mut problem = Problem::of(Engine::cpu(), losses(), config);
     // A hundred times the work of a head that runs once a ray: fewer rays.
     problem.rays_per_frame = 16;
-    let d = &problem.device;
+    let d = &problem.rig;
     assert!(d.fusion.is_none() && d.suppressor.is_none());
     let head = d.sample_head.as_ref().unwrap();
     let (t, layers) = (head.parameters, head.layers);
@@ -323,12 +334,12 @@ fn per_sample_head_and_semantic_planes() {
         let biases = gradient[layer.bias() as usize..part.end].iter();
         assert!(biases.filter(|g| **g != 0.0).count() * 8 > layer.outputs as usize);
     }
-    let planes = problem.device.semantic;
-    let fine = problem.device.shape.surface[1][3] as usize * 16;
+    let planes = problem.rig.semantic;
+    let fine = problem.rig.shape.surface[1][3] as usize * 16;
     check(&mut problem, planes, &semantic, 0..fine, "coarse semantic planes");
     check(&mut problem, planes, &semantic, fine..semantic.len(), "fine semantic planes");
     // The ray's decoders of classes rest; geometry gets what it gets without classes.
-    assert!(decoders[GEOMETRY_FLOATS + 1188..].iter().all(|g| *g == 0.0));
+    assert!(decoders[SEMANTIC[0].weights..].iter().all(|g| *g == 0.0));
     let mut without = Problem::new(Engine::cpu(), LossConfig { semantic: 0.0, ..losses() });
     without.rays_per_frame = problem.rays_per_frame;
     assert!(without.gradients()[0] == geometry);
@@ -350,9 +361,9 @@ fn semantic_gradients_stop_at_the_weights() {
     let mut problem = Problem::new(Engine::cpu(), only);
     let [geometry, appearance, semantic, decoders] = problem.gradients();
     assert!(geometry.iter().chain(&appearance).all(|g| *g == 0.0));
-    assert!(decoders[..GEOMETRY_FLOATS + 1188].iter().all(|g| *g == 0.0));
+    assert!(decoders[..SEMANTIC[0].weights].iter().all(|g| *g == 0.0));
     assert!(semantic.iter().any(|g| *g != 0.0));
-    let state = block_on(problem.device.read_pose_state(0)).unwrap();
+    let state = problem.rig.read_pose_state(0);
     assert!(state[26..32].iter().all(|g| *g == 0.0), "{state:?}");
 }
 
@@ -370,7 +381,7 @@ fn poses_of_the_window() {
         let mut problem = Problem::new(Engine::cpu(), loss);
         problem.gradients();
         for slot in 0..FRAMES {
-            let state = block_on(problem.device.read_pose_state(slot)).unwrap();
+            let state = problem.rig.read_pose_state(slot);
             let gradient: Vec<f64> = state[26..32].iter().map(|g| f64::from(*g)).collect();
             let norm = gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
             assert!(norm > 1e-3, "{name}: no gradient at frame {slot}");
@@ -395,9 +406,9 @@ fn poses_of_the_window() {
 }
 
 fn place(problem: &mut Problem, slot: u32, pose: &Pose) {
-    let mut r = Recording::new();
-    problem.device.upload_pose(&mut r, slot, pose);
-    problem.device.engine.submit(&r).unwrap();
+    let mut r = Commands::new();
+    problem.rig.upload_pose(&mut r, slot, pose);
+    problem.rig.submit(&r);
 }
 
 /// Rays without depth and rays that leave the map, with the samples held where they are: geometry
@@ -447,7 +458,7 @@ fn rays_without_depth_teach_colour() {
     let mut pose_gradient = [0.0; 6];
     for ray in state.floats("ray_state").chunks_exact(RAY_STATE_FLOATS).skip(rays).take(rays) {
         for k in 0..3 {
-            pose_gradient[k] += f64::from(ray[296 + k]);
+            pose_gradient[k] += f64::from(ray[STATE_POSE as usize * 4 + k]);
             pose_gradient[3 + k] += f64::from(ray[300 + k]);
         }
     }
@@ -458,7 +469,7 @@ fn rays_without_depth_teach_colour() {
             let mut twist = [0.0; 6];
             twist[k] = h;
             let mut moved = fixed.clone();
-            let pose = mte_slam_core::device::pose_words(&fixture::pose(0).retract(&twist));
+            let pose = mte_slam_core::map::pose_words(&fixture::pose(0).retract(&twist));
             moved.buffers.get_mut("poses").unwrap()[..12].copy_from_slice(&f32_words(pose));
             moved.run(&mut Engine::cpu(), &SAMPLE_RAYS);
             total(&mut moved)
@@ -488,7 +499,7 @@ fn alignment_to_the_field() {
         let mut p = state.params;
         [p.inv_sigma_distance, p.inv_sigma_intensity] =
             if kind == 0 { [inverse[0], 0.0] } else { [0.0, inverse[1]] };
-        let mut poses = f32_words(mte_slam_core::device::pose_words(pose));
+        let mut poses = f32_words(mte_slam_core::map::pose_words(pose));
         poses.resize(36, 0);
         state.buffers.insert("poses", poses);
         state.buffers.insert("pixels", f32_words(*pixel));

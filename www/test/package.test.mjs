@@ -1,10 +1,11 @@
-// The package as another page uses it: the lines of www/README.md as they stand, on a page of its own.
+// The package as npm would install it, used by another page: the lines of www/README.md as they stand.
 import assert from "node:assert/strict";
 import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { test } from "node:test";
 import { fileURLToPath } from "node:url";
 import { launch } from "./browser.mjs";
+import { pack } from "./npm.mjs";
 import { setUp, world } from "./page.mjs";
 
 setUp();
@@ -15,8 +16,9 @@ test("the example of the README maps a picked folder and saves its mesh", { time
   const example = readme.slice(start).split("\n").reduce(
     (lines, line) => (lines.ended || (line !== "" && !line.startsWith("    ")) ? Object.assign(lines, { ended: true }) : lines.concat(line.slice(4))), []).join("\n");
   assert.ok(example.trim().split("\n").length <= 22 && /slam\.start/.test(example), example);
+  pack(join(world.scratch, "npm"));
   writeFileSync(join(world.scratch, "other.html"), `<!doctype html><meta charset="utf-8">
-    <script type="importmap">{ "imports": { "mte-slam": "/some/where/mte-slam.js" } }</script>
+    <script type="importmap">{ "imports": { "mte-slam": "/data/npm/lib/mte-slam.js" } }</script>
     <input type="file" id="files" webkitdirectory>
     <script>
       const input = document.getElementById("files");
@@ -50,4 +52,16 @@ test("the example of the README maps a picked folder and saves its mesh", { time
   assert.match(lines.join("\n"), /my room 6 frames on .*\n(.*\n)*0 \d.* ms, error/);
   assert.deepEqual(errors.filter((e) => !/favicon|Failed to load resource/.test(e)), []);
   await browser.close();
+});
+
+test("the built page's folder holds the package, too, under a name that stays", { timeout: 60_000 }, async () => {
+  const page = await world.browser.newPage();
+  await page.goto(`${world.server.url}/data/room/files.json`);
+  const ready = await page.evaluate(async () => {
+    const { MteSlam } = await import("/some/where/mte-slam.js");
+    const slam = new MteSlam();
+    return new Promise((resolve) => slam.on("ready", resolve));
+  });
+  assert.match(ready.version, /^\d+\.\d+\.\d+/);
+  await page.close();
 });

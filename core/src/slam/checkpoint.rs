@@ -8,11 +8,11 @@ use crate::{
     camera::Camera,
     classes::ClassTable,
     config::Config,
-    device::{AnchorCounts, Counters},
     frame::{Bounds, MAX_FEATURE_CHANNELS, SequenceInfo},
     hash::Hasher,
+    map::{AnchorCounts, Counters},
     pose::Pose,
-    track::odometry::{ColourRegistration, OdometerState},
+    track::odometry::{ColorRegistration, OdometerState},
 };
 use alloc::{
     collections::BTreeMap,
@@ -141,7 +141,7 @@ pub(super) struct State {
     pub keyframes: Vec<SavedKeyframe>,
     pub observed_frames: Vec<usize>,
     pub anchor_history: Vec<(usize, AnchorCounts)>,
-    pub registrations: Vec<(usize, ColourRegistration)>,
+    pub registrations: Vec<(usize, ColorRegistration)>,
     pub odometer: OdometerState,
 }
 
@@ -176,6 +176,15 @@ fn configuration_hash(json: &str) -> String {
     format!("{:016x}", h.finish())
 }
 
+/// The configuration in the text of a state, as it was written: that of an earlier version may lack
+/// settings, and written again it would have them. `None` where it does not stand first.
+fn recorded_configuration(state: &str) -> Option<&str> {
+    let text = state.strip_prefix("{\"config\":")?;
+    let mut values = serde_json::Deserializer::from_str(text).into_iter::<serde::de::IgnoredAny>();
+    values.next()?.ok()?;
+    text.get(..values.byte_offset())
+}
+
 /// A hash of a sequence and the frames that were processed.
 fn data_hash(sequence: &str, hashes: &[u64]) -> String {
     let mut h = Hasher::default();
@@ -199,14 +208,14 @@ impl Slam {
             return Err(wrong("state", "a map that was restored to be shown", "a run"));
         }
         let used_slots = self.used_slots;
-        let device = self.device()?;
+        let (engine, map, _) = self.mapped()?;
         let mut tensors = Vec::new();
-        for b in device.state_buffers(used_slots) {
-            let words = device.engine.read(b.buffer, 0, b.words()).await?;
+        for b in map.state_buffers(used_slots) {
+            let words = engine.read(b.buffer, 0, b.words()).await?;
             let dtype = if b.floats { Dtype::F32 } else { Dtype::U32 };
             tensors.push(tensor(&b.name, dtype, b.shape.to_vec(), &words));
         }
-        let (bounds, counters, slots) = (device.shape.bounds, device.counters(), device.slots);
+        let (bounds, counters, slots) = (map.shape.bounds, map.counters(), map.slots());
 
         let n = self.frames.len();
         let poses: Vec<[f64; 16]> =
@@ -288,7 +297,7 @@ impl Checkpoint {
         Ok(bytemuck::pod_collect_to_vec(&found.bytes))
     }
 
-    /// Everything but the device's buffers, checked.
+    /// Everything but the map's buffers, checked.
     pub(super) fn saved(&self) -> Result<Saved, SlamError> {
         let entry =
             |key: &str| self.metadata.get(key).ok_or_else(|| wrong(key, "nothing", "an entry"));
@@ -299,7 +308,10 @@ impl Checkpoint {
             .map_err(|e| wrong("state", e, "the state of a run"))?;
         let n = self.frames().unwrap_or(0);
         let hashes: Vec<u64> = self.values("frames.hash", Dtype::U64, n)?;
-        let hash = configuration_hash(&json(&state.config)?);
+        let hash = match recorded_configuration(entry("state")?) {
+            Some(text) => configuration_hash(text),
+            None => configuration_hash(&json(&state.config)?),
+        };
         if *entry("configuration")? != hash {
             return Err(wrong("configuration", entry("configuration")?, hash));
         }

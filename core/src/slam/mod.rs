@@ -7,6 +7,7 @@ mod checkpoint_file;
 mod live;
 mod mapping;
 mod output;
+mod pace;
 mod parameters;
 mod resume;
 mod semantics;
@@ -18,22 +19,23 @@ mod tests;
 pub use checkpoint::{Checkpoint, Dtype, Tensor};
 pub use live::{LiveMesh, MeshChunk};
 pub use output::View;
+pub use pace::{Pace, Turn, Unpaced};
 pub use parameters::ParameterCounts;
 pub use resume::Resuming;
 
 use crate::{
+    commands::Commands,
     config::{Config, ConfigError, Tracker},
-    device::{AnchorCounts, Device},
     engine::{Engine, EngineError},
     frame::{Bounds, Frame, SequenceInfo},
     keyframe::Keyframe,
+    map::{AnchorCounts, Map, Scratch},
     mesh::MeshError,
     pose::Pose,
-    recording::Recording,
-    track::odometry::{ColourRegistration, Odometer, OdometryConfig, OdometryError},
+    track::odometry::{ColorRegistration, Odometer, OdometryError},
 };
-use alloc::{borrow::Cow, boxed::Box, format, string::String, vec::Vec};
-use core::{future::Future, pin::Pin};
+use alloc::{borrow::Cow, format, string::String, vec::Vec};
+use serde::{Deserialize, Serialize};
 
 /// What a run could not do.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -42,7 +44,7 @@ pub enum SlamError {
     #[error(transparent)]
     Engine(#[from] EngineError),
     /// The configuration is not usable.
-    #[error(transparent)]
+    #[error("configuration: {0}")]
     Config(#[from] ConfigError),
     /// Tracking could not even be tried.
     #[error(transparent)]
@@ -84,7 +86,8 @@ pub enum SlamError {
 }
 
 /// How a frame's pose came about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum TrackingStatus {
     /// The first frame: its pose defines the world.
     First,
@@ -92,6 +95,17 @@ pub enum TrackingStatus {
     Tracked,
     /// Not located; its pose is a guess and the map ignores it.
     Lost,
+}
+
+impl TrackingStatus {
+    /// `first`, `tracked` or `lost`.
+    pub fn name(self) -> &'static str {
+        match self {
+            TrackingStatus::First => "first",
+            TrackingStatus::Tracked => "tracked",
+            TrackingStatus::Lost => "lost",
+        }
+    }
 }
 
 /// The pose of one frame.
@@ -108,7 +122,7 @@ pub struct PoseEstimate {
 }
 
 /// Mean losses of the last mapping iteration, weighted as optimised.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Losses {
     /// Sum of the others.
     pub total: f64,
@@ -129,7 +143,7 @@ pub struct FrameReport {
     pub status: TrackingStatus,
     /// Its pose at this moment; mapping may correct it later.
     pub world_from_camera: Pose,
-    /// Time of tracking \[s\]; 0 without a clock.
+    /// Time of tracking \[s\]; 0 without a clock ([`Pace::now_s`]).
     pub tracking_s: f64,
     /// Time of mapping \[s\]; 0 without a clock.
     pub mapping_s: f64,
@@ -148,23 +162,20 @@ pub(crate) struct Observation {
     pub depth: Vec<u16>,
 }
 
-/// Called between slices of a long optimisation with the iterations done and their number; work
-/// goes on when its future is ready. A host with an event loop returns to it here.
-pub type Breathe = fn(done: u32, total: u32) -> Pin<Box<dyn Future<Output = ()>>>;
-
 /// The system.
 pub struct Slam {
     config: Config,
-    breathe: Option<Breathe>,
     info: SequenceInfo,
-    /// Before the first frame, whose depth may decide the bounds.
-    engine: Option<Engine>,
-    device: Option<Device>,
+    engine: Engine,
+    /// Made with the first frame, whose depth may decide the bounds.
+    map: Option<Map>,
+    /// The buffers that the passes over the map work in.
+    scratch: Option<Scratch>,
     odometer: Odometer,
-    /// Where the colours of the images on the device have been found to lie.
-    registration: ColourRegistration,
+    /// Where the colours of the stored images have been found to lie.
+    registration: ColorRegistration,
     /// The changes of `registration`: from which frame on it was in force.
-    registrations: Vec<(usize, ColourRegistration)>,
+    registrations: Vec<(usize, ColorRegistration)>,
     frames: Vec<PoseEstimate>,
     /// [`Frame::content_hash`] of each frame.
     hashes: Vec<u64>,
@@ -183,14 +194,13 @@ pub struct Slam {
     anchor_history: Vec<(usize, AnchorCounts)>,
     /// Restored without odometry and images: takes no frames.
     only_shown: bool,
-    clock: Option<fn() -> f64>,
 }
 
 /// Slot whose pose is used for tracking and views; it has no images.
 pub(crate) const VIEW_SLOT: u32 = 0;
 
 impl Slam {
-    /// A system that has seen nothing. The device's buffers are made with the first frame.
+    /// A system that has seen nothing. The map's buffers are made with the first frame.
     ///
     /// # Errors
     /// [`SlamError::Config`].
@@ -199,21 +209,20 @@ impl Slam {
         config: Config,
         info: &SequenceInfo,
     ) -> Result<Slam, SlamError> {
-        let mut slam = Slam::without_engine(config, info)?;
-        slam.engine = Some(engine);
-        Ok(slam)
+        Slam::on_engine(engine, config, info)
     }
 
-    fn without_engine(config: Config, info: &SequenceInfo) -> Result<Slam, SlamError> {
+    fn on_engine(engine: Engine, config: Config, info: &SequenceInfo) -> Result<Slam, SlamError> {
         config.validate()?;
+        let odometer = Odometer::new(config.odometry.clone());
         Ok(Slam {
             config,
-            breathe: None,
             info: info.clone(),
-            engine: None,
-            device: None,
-            odometer: Odometer::new(OdometryConfig::default()),
-            registration: ColourRegistration::default(),
+            engine,
+            map: None,
+            scratch: None,
+            odometer,
+            registration: ColorRegistration::default(),
             registrations: Vec::new(),
             frames: Vec::new(),
             hashes: Vec::new(),
@@ -228,27 +237,27 @@ impl Slam {
             finished_iterations: 0,
             anchor_history: Vec::new(),
             only_shown: false,
-            clock: None,
         })
     }
 
-    /// Gives the system a clock \[s\]; without one reports carry no times.
-    pub fn set_clock(&mut self, clock: fn() -> f64) {
-        self.clock = Some(clock);
-    }
-
-    /// Cuts optimisations into slices of some iterations: after each the device's work is waited
-    /// for, and `breathe` is called.
-    pub fn set_breathe(&mut self, breathe: Breathe) {
-        self.breathe = Some(breathe);
-    }
-
-    /// Track a frame and, when it is due, map it.
+    /// Tracks a frame and, when it is due, maps it; reports no times.
     ///
     /// # Errors
     /// A frame of another size, a first frame without depth or pose, engine failures. A frame that
     /// cannot be located is no error: its status is [`TrackingStatus::Lost`].
     pub async fn process(&mut self, frame: &Frame) -> Result<FrameReport, SlamError> {
+        self.process_with(frame, &mut Unpaced).await
+    }
+
+    /// [`Slam::process`] with the clock and the event loop of the program around it.
+    ///
+    /// # Errors
+    /// As [`Slam::process`].
+    pub async fn process_with(
+        &mut self,
+        frame: &Frame,
+        pace: &mut dyn Pace,
+    ) -> Result<FrameReport, SlamError> {
         self.check(frame)?;
         if self.only_shown {
             return Err(SlamError::Frame {
@@ -260,21 +269,20 @@ impl Slam {
         }
         let hash = frame.content_hash();
         self.finished_iterations = 0;
-        let now = |s: &Slam| s.clock.map_or(0.0, |c| c());
-        let start = now(self);
+        let start = pace.now_s();
         let (status, new_reference) = self.track(frame).await?;
         self.hashes.push(hash);
-        let tracked = now(self);
+        let tracked = pace.now_s();
         let due = frame.index.is_multiple_of(self.config.mapping.every as usize);
         let mut losses = None;
         let mut keyframe = false;
         if status != TrackingStatus::Lost && (due || new_reference) {
             let frame = self.registered(frame);
-            let mapped = self.map(&frame, new_reference).await?;
+            let mapped = self.map(&frame, new_reference, pace).await?;
             losses = Some(mapped.0);
             keyframe = mapped.1;
         }
-        let end = now(self);
+        let end = pace.now_s();
         self.follow_odometer();
         let world_from_camera = self.frames.last().map_or(Pose::IDENTITY, |f| f.world_from_camera);
         Ok(FrameReport {
@@ -291,7 +299,7 @@ impl Slam {
     /// Where the map takes the colour image to lie on the depth image: what the odometry has found,
     /// the identity as long as nothing speaks against it (and with true poses, where no odometry
     /// runs).
-    pub fn colour_registration(&self) -> ColourRegistration {
+    pub fn color_registration(&self) -> ColorRegistration {
         self.registration
     }
 
@@ -302,26 +310,26 @@ impl Slam {
     }
 
     /// Takes over a registration of colour that the odometry found or improved. It settles only
-    /// after some keyframes; the images of those before are still on the device, so they are read
+    /// after some keyframes; the images of those before are still stored, so they are read
     /// back, resampled and stored again. What the map has already learnt from them fades as later
     /// iterations draw from the corrected images.
     pub(super) async fn follow_registration(&mut self, frame: usize) -> Result<(), SlamError> {
-        let found = self.odometer.colour_registration();
+        let found = self.odometer.color_registration();
         if found == self.registration {
             return Ok(());
         }
         self.registrations.push((frame, found));
         // The stored images have the former registration applied.
-        let change = ColourRegistration { scale: found.scale / self.registration.scale };
+        let change = ColorRegistration { scale: found.scale / self.registration.scale };
         self.registration = found;
         let camera = self.info.camera;
         let slots: Vec<u32> = self.keyframes.iter().map(|k| k.slot).collect();
         for slot in slots {
-            let device = self.device()?;
-            let image = device.read_color(slot).await?;
-            let mut r = Recording::default();
-            device.upload_color(&mut r, slot, &change.resampled(&image, &camera));
-            device.engine.submit(&r)?;
+            let (engine, map, _) = self.mapped()?;
+            let image = map.frames.read_color(engine, slot).await?;
+            let mut r = Commands::default();
+            map.frames.upload_color(&mut r, slot, &change.resampled(&image, &camera));
+            engine.submit(&r)?;
         }
         Ok(())
     }
@@ -354,21 +362,25 @@ impl Slam {
 
     /// The map's box \[m\], once there is a map.
     pub fn bounds(&self) -> Option<Bounds> {
-        self.device.as_ref().map(|d| d.shape.bounds)
+        self.map.as_ref().map(|m| m.shape.bounds)
     }
 
-    /// Bytes of device buffers.
+    /// Bytes of the engine's buffers.
     pub fn memory_bytes(&self) -> usize {
-        self.device.as_ref().map_or(0, |d| d.engine.allocated_bytes() as usize)
+        self.engine.allocated_bytes() as usize
     }
 
     /// Most that [`Slam::memory_bytes`] has been, as while bounds grew \[bytes\].
     pub fn peak_memory_bytes(&self) -> u64 {
-        self.device.as_ref().map_or(0, |d| d.engine.peak_bytes())
+        self.engine.peak_bytes()
     }
 
-    pub(crate) fn device(&mut self) -> Result<&mut Device, SlamError> {
-        self.device.as_mut().ok_or(SlamError::NoMap)
+    /// Engine, map and scratch buffers, once there is a map.
+    fn mapped(&mut self) -> Result<(&mut Engine, &mut Map, &Scratch), SlamError> {
+        match (&mut self.map, &self.scratch) {
+            (Some(map), Some(scratch)) => Ok((&mut self.engine, map, scratch)),
+            _ => Err(SlamError::NoMap),
+        }
     }
 
     fn check(&self, frame: &Frame) -> Result<(), SlamError> {

@@ -46,7 +46,7 @@ fn same_size(what: &'static str, found: usize, expected: usize) -> Result<(), Me
 }
 
 impl PsnrMeter {
-    /// Add an image of 8-bit sRGB pixels; returns its PSNR \[dB\] over all pixels and channels.
+    /// Adds an image of 8-bit sRGB pixels; returns its PSNR \[dB\] over all pixels and channels.
     ///
     /// # Errors
     /// Images of different or zero size.
@@ -63,7 +63,7 @@ impl PsnrMeter {
         Ok(db)
     }
 
-    /// The figures so far, `None` without images.
+    /// Returns the figures so far, `None` without images.
     pub fn report(&self) -> Option<PsnrReport> {
         (self.images > 0).then(|| PsnrReport {
             protocol_id: crate::protocol::PSNR_VIEWS.into(),
@@ -110,7 +110,7 @@ pub struct DepthMeter {
 }
 
 impl DepthMeter {
-    /// Add an image: rendered depth along z \[m\], and sensor depth in units of `unit_m`. Values
+    /// Adds an image: rendered depth along z \[m\], and sensor depth in units of `unit_m`. Values
     /// that are 0, negative or not finite are invalid. Returns the image's mean error \[m\] if
     /// any pixel has both.
     ///
@@ -145,7 +145,7 @@ impl DepthMeter {
         Ok(Some(sum / both as f64))
     }
 
-    /// The figures so far, `None` when no pixel had both depths.
+    /// Returns the figures so far, `None` when no pixel had both depths.
     pub fn report(&self) -> Option<DepthReport> {
         (self.both > 0).then(|| DepthReport {
             protocol_id: crate::protocol::DEPTH_VIEWS.into(),

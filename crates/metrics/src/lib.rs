@@ -23,7 +23,8 @@ pub use surface::{
     SurfaceFigures, SurfaceOptions, SurfaceReport, evaluate_surface, icp, sample_surface,
 };
 pub use trajectory::{
-    Alignment, AteReport, ErrorSummary, PosePair, RpeReport, TrajectoryError, align_rigid, ate, rpe,
+    AteReport, ErrorSummary, PosePair, RigidAlignment, RpeReport, TrajectoryError, align_rigid,
+    ate, rpe,
 };
 pub use virtual_views::{
     DepthViews, MeshDepthReport, VIRTUAL_CAMERA, culling_views, depth_l1, depth_views,

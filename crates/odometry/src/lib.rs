@@ -11,21 +11,24 @@ mod align;
 mod calibration;
 mod config;
 mod features;
+mod keyframe;
 mod linear;
 mod odometer;
 mod pose_graph;
 mod pyramid;
 mod registration;
+mod registration_search;
 mod residuals;
 mod saved;
 mod thumbnail;
 
 pub use align::{Alignment, Reference, align, align_many};
 pub use config::{AlignConfig, OdometryConfig, PyramidConfig};
-pub use odometer::{Keyframe, LostReason, Odometer, OdometryResult, Quality};
+pub use keyframe::OdometryKeyframe;
+pub use odometer::{LostReason, Odometer, OdometryResult, Quality};
 pub use pose_graph::{Edge, PoseGraph};
 pub use pyramid::RgbdPyramid;
-pub use registration::ColourRegistration;
+pub use registration::ColorRegistration;
 pub use saved::{OdometerState, Rebuild, since};
 
 #[cfg(test)]

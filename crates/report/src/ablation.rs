@@ -4,7 +4,8 @@ use crate::{
     text_table::table,
 };
 use mte_slam_core::{config::Head, slam::ParameterCounts};
-use serde::{Deserialize, Serialize};
+use mte_slam_types::settings::Choice;
+use serde::{Deserialize, Serialize, Serializer};
 use std::{collections::BTreeMap, fmt::Write};
 
 /// What makes two runs comparable; all of it must be equal for a kept run to be used.
@@ -24,7 +25,7 @@ pub struct RunKey {
     pub layout: String,
     /// First frame taken.
     pub start: usize,
-    /// Every how many-th frame was taken.
+    /// Step between the frames taken.
     pub stride: usize,
     /// Frames taken.
     pub frames: usize,
@@ -40,7 +41,7 @@ pub struct RunKey {
     pub classes: Option<String>,
     /// Id asked to mean "no label".
     pub unlabelled: Option<u16>,
-    /// Every how many-th frame is scored.
+    /// Step between the frames scored.
     pub render_every: usize,
     /// `gpu` or `cpu`.
     pub engine: String,
@@ -100,7 +101,7 @@ pub struct FinishedRun {
     pub psnr_db: Option<f64>,
     /// Frames that could not be tracked.
     pub lost_frames: usize,
-    /// Mapping time an iteration, with what belongs to it \[s\]; `None` without iterations.
+    /// Mapping time per iteration, with what belongs to it \[s\]; `None` without iterations.
     pub mapping_iteration_s: Option<f64>,
     /// The last optimisation over all keyframes \[s\].
     pub finish_s: f64,
@@ -163,7 +164,13 @@ pub struct Variant {
     /// Feature redundancy suppressor.
     pub suppressor: bool,
     /// What makes classes of features.
+    #[serde(serialize_with = "choice_name")]
     pub head: Head,
+}
+
+/// Writes a choice under its name in a configuration.
+fn choice_name<S: Serializer>(choice: &impl Choice, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(choice.names().get(choice.index()).copied().unwrap_or_default())
 }
 
 /// One row of the table.
@@ -236,7 +243,7 @@ static FIGURES: [Figure; 9] = [
     figure("ate_rmse_cm", "ATE cm", 3, |r| r.ate_rmse_cm),
     Figure {
         factor: 1000.0,
-        ..figure("mapping_iteration_s", "ms an iteration", 1, |r| r.mapping_iteration_s)
+        ..figure("mapping_iteration_s", "ms per iteration", 1, |r| r.mapping_iteration_s)
     },
     figure("finish_s", "last optimisation s", 1, |r| Some(r.finish_s)),
 ];
@@ -306,7 +313,7 @@ pub struct Ablation {
     pub engine: EngineRecord,
     /// Seeds of every row.
     pub seeds: Vec<u32>,
-    /// Every how many-th frame was scored.
+    /// Step between the frames scored.
     pub render_every: usize,
     /// The labels that the map learnt from, against the truth; none where they are the truth.
     pub input_labels: Option<ClassScores>,

@@ -10,7 +10,7 @@ use mte_slam_metrics::{
     AteReport, ConfusionMatrix, DepthMeter, PosePair, PsnrMeter, SemanticMeter, TrajectoryError,
     align_rigid, ate,
 };
-use mte_slam_odometry::ColourRegistration;
+use mte_slam_odometry::ColorRegistration;
 use mte_slam_types::{
     classes::ClassTable,
     frame::{Frame, SequenceInfo},
@@ -59,7 +59,7 @@ pub struct ViewScores {
     input_labels: SemanticMeter,
     frames: Vec<usize>,
     info: SequenceInfo,
-    registration: ColourRegistration,
+    registration: ColorRegistration,
 }
 
 impl ViewScores {
@@ -68,7 +68,7 @@ impl ViewScores {
     pub fn new(
         info: &SequenceInfo,
         truth: ClassTruth,
-        registration: ColourRegistration,
+        registration: ColorRegistration,
     ) -> ViewScores {
         ViewScores {
             depth: DepthMeter::default(),
@@ -109,7 +109,7 @@ impl ViewScores {
         Ok((registration.registered(frame, camera), labels))
     }
 
-    /// Add a view of `frame`, whose classes are those of the truth's table, as are `labels`, the
+    /// Adds a view of `frame`, whose classes are those of the truth's table, as are `labels`, the
     /// true ones of the frame; both as [`ViewScores::registered`] gives them.
     pub fn add(&mut self, frame: &Frame, view: &View, labels: Option<&[u8]>) -> Result<()> {
         let place = || format!("scoring the view of frame {}", frame.index);
@@ -118,7 +118,7 @@ impl ViewScores {
         if let Some(labels) = labels {
             let width = self.info.camera.width as usize;
             self.classes.add(width, labels, &view.class).with_context(place)?;
-            // A frame without labels tells nothing about those that there are.
+            // A frame without labels says nothing about those of others.
             if let Some(input) = frame.labels.as_ref().filter(|_| self.truth.is_own()) {
                 let input = self.truth.of_map(input);
                 self.input_labels.add(width, labels, &input).with_context(place)?;
@@ -133,7 +133,7 @@ impl ViewScores {
         (&self.truth.table, self.classes.confusion())
     }
 
-    /// Put the figures, or why there are none, into `metrics`. `unlabelled_id` is that of the
+    /// Puts the figures, or why there are none, into `metrics`. `unlabelled_id` is that of the
     /// class pictures.
     pub fn report(&mut self, unlabelled_id: u16, metrics: &mut Metrics) {
         if self.frames.is_empty() {

@@ -29,7 +29,7 @@ pub struct MeshTruth {
 }
 
 impl MeshTruth {
-    /// Read a PLY file.
+    /// Reads a PLY file.
     pub fn read(path: &Path) -> Result<MeshTruth> {
         let name = path.display();
         let bytes =
@@ -109,7 +109,7 @@ pub struct ProtocolViews {
     pub seed: u32,
 }
 
-/// Put the figures of `ours` against the true mesh, or why there are none, into `metrics`.
+/// Puts the figures of `ours` against the true mesh, or why there are none, into `metrics`.
 pub fn score(
     ours: Mesh,
     truth: MeshTruth,
@@ -237,7 +237,7 @@ fn sensor_visibility(
     for index in 0..info.frames {
         let Some(world_from_camera) = sequence.truth(index) else { continue };
         let frame = sequence.frame(index)?;
-        let view = mte_slam_mesh::View {
+        let view = mte_slam_mesh::CullingView {
             camera: &info.camera,
             world_from_camera,
             depth: &frame.depth,
@@ -250,7 +250,7 @@ fn sensor_visibility(
     Ok(seen)
 }
 
-/// Align the first mesh of a pair to the second.
+/// Aligns the first mesh of a pair to the second.
 fn align([ours, truth]: &mut [Mesh; 2], seed: u32) -> Result<()> {
     let aligned = mte_slam_metrics::icp(ours, truth, ICP_M, seed)?;
     ours.transform(&aligned);

@@ -1,7 +1,7 @@
 //! `metrics.json`: every figure with its unit in the key and its protocol beside it, and the table
 //! that people read at the end of a run.
 use crate::{protocol::Protocol, timings::Spread};
-use mte_slam_core::device::AnchorCounts;
+use mte_slam_core::map::AnchorCounts;
 use mte_slam_metrics::{
     AteReport, BoundaryReport, DepthReport, MeshDepthReport, PsnrReport, SMALL_SHARE_PERCENT,
     SemanticReport, SurfaceReport,
@@ -73,7 +73,7 @@ pub struct Metrics {
     /// Depth L1 of the mesh by virtual views; not to be mixed with `depth`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh_depth: Option<MeshDepthReport>,
-    /// Time a frame.
+    /// Time per frame.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<TimeFigures>,
     /// Memory.
@@ -113,7 +113,7 @@ pub struct SequenceRecord {
     pub height_pixels: u32,
     /// First frame taken.
     pub start: usize,
-    /// Every how many-th frame was taken.
+    /// Step between the frames taken.
     pub stride: usize,
     /// Factor on the images' size.
     pub scale: f64,
@@ -280,7 +280,7 @@ pub struct RenderRecord {
     pub classes_by: Option<String>,
 }
 
-/// Time a frame.
+/// Time per frame.
 #[derive(Debug, Clone, Serialize)]
 pub struct TimeFigures {
     /// What is counted.

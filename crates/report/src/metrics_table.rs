@@ -26,7 +26,7 @@ impl SemanticFigures {
         rows.into_iter().map(|(name, value)| (format!("{prefix}{name}"), value)).collect()
     }
 
-    /// A line a class, most frequent first; beside the IoU that of the `input` labels.
+    /// One line per class, most frequent first; beside the IoU that of the `input` labels.
     fn class_table(&self, input: Option<&SemanticFigures>) -> String {
         let mut classes: Vec<&ClassFigures> = self.classes.iter().collect();
         classes.sort_by_key(|c| std::cmp::Reverse(c.pixels));
@@ -146,9 +146,9 @@ impl Metrics {
         }
         if let Some(t) = &self.time {
             let of = |s: &Spread| format!("{:.3} s (p95 {:.3})", s.median_s, s.p95_s);
-            row("tracking a frame", of(&t.tracking), t.protocol.sentence());
-            row("mapping a mapped frame", of(&t.mapping), "");
-            row("total a frame", of(&t.total), "");
+            row("tracking per frame", of(&t.tracking), t.protocol.sentence());
+            row("mapping per mapped frame", of(&t.mapping), "");
+            row("total per frame", of(&t.total), "");
             row("last optimisation", format!("{:.1} s", t.last_optimisation_s), "");
             row("whole program", format!("{:.1} s", t.wall_s), "");
         }

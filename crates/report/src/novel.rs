@@ -35,7 +35,7 @@ pub fn moved(pose: &Pose, k: usize) -> Pose {
     pose.compose(&Pose::from_twist(&[side * ASIDE_M, -UP_M, 0.0, 0.0, turn, 0.0]))
 }
 
-/// Write views from poses beside a sequence's path, spread along it, as a recording in Replica's
+/// Writes views from poses beside a sequence's path, spread along it, as a recording in Replica's
 /// layout in the folder for such views.
 pub fn write(
     sequence: &mut dyn Sequence,
@@ -134,7 +134,7 @@ pub fn of_recording(
     Ok(())
 }
 
-/// Render and score the views that `next` gives, at their true poses in the map's world.
+/// Renders and score the views that `next` gives, at their true poses in the map's world.
 fn score(
     slam: &mut Slam,
     info: &SequenceInfo,
@@ -144,7 +144,7 @@ fn score(
     (protocol, sentence): (Protocol, String),
 ) -> Result<Option<NovelFigures>> {
     let estimate_from_truth = truth_from_estimate.inverse();
-    let mut scores = ViewScores::new(info, truth, slam.colour_registration());
+    let mut scores = ViewScores::new(info, truth, slam.color_registration());
     let mut views = 0;
     while let Some(frame) = next()? {
         let Some(pose) = frame.truth else { continue };
@@ -193,7 +193,7 @@ pub fn by_inference(
     slam.set_inference(inference);
     let info = sequence.info().clone();
     let poses: Vec<Pose> = slam.trajectory().iter().map(|e| e.world_from_camera).collect();
-    let mut scores = ViewScores::new(&info, truth, slam.colour_registration());
+    let mut scores = ViewScores::new(&info, truth, slam.color_registration());
     for (i, &index) in rendered.iter().enumerate() {
         let pose = poses.get(index).with_context(|| {
             format!("frame {index}: found a map of {} frames, expected more", poses.len())

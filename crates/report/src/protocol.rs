@@ -188,7 +188,7 @@ impl Protocol {
             Protocol::Surface { .. } => "samples of two meshes, both culled alike",
             Protocol::MeshDepth { .. } => "depth of two meshes in virtual views",
             Protocol::Time => {
-                "wall clock a frame, median and 95th percentile; without reading and decoding \
+                "wall clock per frame, median and 95th percentile; without reading and decoding \
                  images, without evaluation, and without the last optimisation, which is given \
                  apart. The first frame is not tracked; its mapping may compile pipelines"
             }
@@ -214,7 +214,7 @@ impl Protocol {
                  (SNI-SLAM's released script takes one frame at its true pose with true depth)"
             }
             Protocol::PaperRuntime => {
-                "average processing time a frame on an NVIDIA RTX 4090; the first five methods are \
+                "average processing time per frame on an NVIDIA RTX 4090; the first five methods are \
                  without semantics"
             }
             Protocol::PaperAblation => {

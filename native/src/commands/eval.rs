@@ -9,8 +9,9 @@ use crate::{
     output::{
         folder::replace_file, metrics::Metrics, pictures::unlabelled_id, trajectory::read_tum,
     },
-    pipeline::{restore, sequence_record},
     record::{self, RunRecord},
+    restore::restore,
+    results::sequence_record,
     screen::Screen,
 };
 use anyhow::{Context, Result, anyhow, bail};
@@ -18,7 +19,7 @@ use image::{ColorType, DynamicImage};
 use mte_slam_core::{config::Inference, slam::View};
 use mte_slam_mesh::read_ply;
 use mte_slam_metrics::PosePair;
-use mte_slam_odometry::ColourRegistration;
+use mte_slam_odometry::ColorRegistration;
 use mte_slam_report::novel::{FOLDER as NOVEL_FOLDER, by_inference, sni as sni_frame};
 use mte_slam_types::{
     classes::{ClassTable, UNLABELLED},
@@ -79,7 +80,7 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
         ..Metrics::default()
     };
     let truth_from_estimate = evaluate_trajectory(out, sequence.as_ref(), &mut metrics)?;
-    let registration = ColourRegistration { scale: record.colour_scale };
+    let registration = ColorRegistration { scale: record.color_scale };
     let sni = args.miou_protocol == MiouProtocol::Sni;
     let rendered = rendered_frames(out, info.frames);
     if sni || novel.is_some() || args.inference.is_some() {
@@ -157,7 +158,7 @@ fn protocols(args: &EvalArgs) -> MeshProtocols {
     }
 }
 
-/// Gives back what aligns the estimate with the truth; the identity where that is not known.
+/// Returns what aligns the estimate with the truth; the identity where that is not known.
 fn evaluate_trajectory(out: &Path, sequence: &dyn Sequence, metrics: &mut Metrics) -> Result<Pose> {
     let path = out.join("trajectory.txt");
     let name = path.display().to_string();
@@ -216,7 +217,7 @@ fn evaluate_renders(
     out: &Path,
     sequence: &mut dyn Sequence,
     class_truth: ClassTruth,
-    (registration, rendered): (ColourRegistration, &[usize]),
+    (registration, rendered): (ColorRegistration, &[usize]),
     screen: Screen,
     metrics: &mut Metrics,
 ) -> Result<()> {
@@ -243,7 +244,7 @@ fn evaluate_renders(
     Ok(())
 }
 
-/// What the run's metrics.json says of its pictures, which alone do not tell which id has no meaning
+/// What the run's metrics.json says of its pictures, which alone do not say which id has no meaning
 /// where the map knew other classes than the true labels.
 fn recorded_renders(out: &Path) -> Option<serde_json::Value> {
     let text = std::fs::read_to_string(out.join("metrics.json")).ok()?;

@@ -23,7 +23,7 @@ use std::{
 /// Cores that a run on the processor uses well.
 const CORES_A_RUN: usize = 4;
 
-/// Run a suite, or what is asked of it.
+/// Runs a suite, or what is asked of it.
 pub fn run(args: &EvaluateArgs, screen: Screen) -> Result<()> {
     let suite = Suite::read(&args.suite, &RunCommand)?;
     let out = args.out.clone().unwrap_or_else(|| Path::new("out").join(&suite.name));
@@ -74,7 +74,7 @@ pub fn run(args: &EvaluateArgs, screen: Screen) -> Result<()> {
     Ok(())
 }
 
-/// The runs, with progress; gives back those that failed, and why.
+/// The runs, with progress; returns those that failed, and why.
 fn work(todo: &[&Run], jobs: usize, screen: Screen) -> Result<Vec<(String, String)>> {
     let begin = Instant::now();
     let mut progress = screen.progress("runs", todo.len());

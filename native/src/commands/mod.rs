@@ -1,4 +1,4 @@
-//! One file a subcommand.
+//! One file per subcommand.
 pub mod ablate;
 pub mod bench;
 pub mod convert;
@@ -11,5 +11,6 @@ pub mod mesh;
 pub mod render;
 pub mod run;
 pub mod serve;
+pub mod settings;
 pub mod shaders;
 pub mod synth;

@@ -13,10 +13,10 @@ use std::{
 };
 
 const STAGING: &str = ".partial";
-/// What an interrupted run goes on from.
+/// What an interrupted run resumes from.
 const RESUME: &str = mte_slam_report::files::RESUME_FOLDER;
 /// Files that mark a folder as one of ours; results of a run that was killed while they were put in
-/// place lie beside what it goes on from.
+/// place lie beside what it resumes from.
 const MARKERS: [&str; 3] = ["metrics.json", "config.toml", RESUME];
 /// What a run writes, and therefore what a new run in the same folder takes away first, so that
 /// no file of the old run stays beside files of the new one. `metrics.json` is renamed last.
@@ -50,7 +50,7 @@ pub struct OutputFolder {
 }
 
 impl OutputFolder {
-    /// Prepare `path`: it must be absent, empty, or of an earlier run, unless `force` is given;
+    /// Prepares `path`: it must be absent, empty, or of an earlier run, unless `force` is given;
     /// and it must be writable.
     pub fn prepare(path: &Path, force: bool) -> Result<OutputFolder> {
         if path.exists() && !path.is_dir() {
@@ -104,7 +104,7 @@ impl OutputFolder {
         self.path.join(STAGING)
     }
 
-    /// Stage a file; `name` may hold one folder, `renders/000000.color.png`.
+    /// Stages a file; `name` may hold one folder, `renders/000000.color.png`.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
         let target = self.staging().join(name);
         if let Some(parent) = target.parent() {
@@ -113,7 +113,7 @@ impl OutputFolder {
         fs::write(&target, bytes).with_context(|| not_written(&self.path.join(name)))
     }
 
-    /// Move everything staged into place, replacing what an earlier run left.
+    /// Moves everything staged into place, replacing what an earlier run left.
     pub fn publish(mut self) -> Result<()> {
         let staged = sorted_entries(&self.staging())?;
         for name in OURS {

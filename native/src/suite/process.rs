@@ -28,7 +28,7 @@ pub const LOG: &str = "log.txt";
 /// How often children are looked at.
 const PAUSE: Duration = Duration::from_millis(100);
 
-/// End this process when its standard input ends, if it was started as a part of a suite.
+/// Ends this process when its standard input ends, if it was started as a part of a suite.
 pub fn end_with_parent() {
     if std::env::var_os(TIED).is_none() {
         return;
@@ -43,7 +43,7 @@ pub fn end_with_parent() {
 }
 
 /// How one run ended.
-pub struct Ended {
+pub struct RunOutcome {
     /// Why it failed, if it did.
     pub failure: Option<String>,
     /// How long it took.
@@ -58,12 +58,12 @@ struct Running<'a> {
     log_start: u64,
 }
 
-/// Do the runs, `jobs` at a time, in order; `ended` hears of each, with how many are done.
+/// Makes the runs, `jobs` at a time, in order; `ended` receives each outcome, with how many are done.
 pub fn run_all(
     runs: &[&Run],
     jobs: usize,
     progress: &mut Progress,
-    ended: &mut dyn FnMut(&Run, &Ended, usize, &Progress),
+    ended: &mut dyn FnMut(&Run, &RunOutcome, usize, &Progress),
 ) -> Result<()> {
     let program = std::env::current_exe().context("this program cannot be found again")?;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -82,7 +82,7 @@ pub fn run_all(
                 Err(error) => {
                     done += 1;
                     let failure = Some(format!("{error:#}"));
-                    ended(run, &Ended { failure, time: Duration::ZERO }, done, progress);
+                    ended(run, &RunOutcome { failure, time: Duration::ZERO }, done, progress);
                 }
             }
         }
@@ -105,7 +105,7 @@ pub fn run_all(
             let Running { run, begin, .. } = running.swap_remove(i);
             note_failure(run, failure.as_deref());
             done += 1;
-            ended(run, &Ended { failure, time: begin.elapsed() }, done, progress);
+            ended(run, &RunOutcome { failure, time: begin.elapsed() }, done, progress);
         }
         if progress.wants_message(done as u64) {
             progress.set(done as u64, || message(&running));
@@ -160,7 +160,7 @@ fn new_log(running: &Running) -> Option<String> {
     Some(String::from_utf8_lossy(&bytes).into_owned())
 }
 
-/// For the report of a later start. What cannot be written is told on the screen anyway.
+/// For the report of a later start. What cannot be written is on the screen anyway.
 fn note_failure(run: &Run, failure: Option<&str>) {
     let path = run.folder.join(FAILURE);
     let _ = match failure {

@@ -5,7 +5,7 @@ use anyhow::Result;
 use mte_slam_report::suite::run_file::{RunFile, read};
 use std::path::Path;
 
-/// The flags of `run` that a file stands for: into its own folder, and going on where it ended.
+/// The flags of `run` that a file stands for: into its own folder, continued where it ended.
 pub fn run_args(path: &Path) -> Result<RunArgs> {
     let RunFile { dataset, options } = read(path)?;
     let mut args = options::run_args(&dataset, &options, &path.display().to_string())?;

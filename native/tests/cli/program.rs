@@ -1,9 +1,11 @@
 //! The program, a small run of it and a small recording, for the tests.
 use serde_json::Value;
 use std::{
+    ffi::OsStr,
+    fmt::Debug,
     fs,
     path::{Path, PathBuf},
-    process::{Command, Output},
+    process::{Command, Output, Stdio},
     sync::OnceLock,
 };
 use tempfile::TempDir;
@@ -44,27 +46,34 @@ pub const TINY: [&str; 30] = [
     "4",
 ];
 
-pub fn mte_slam(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_mte-slam"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .expect("the program starts")
+/// The program in `folder`, without the caller's input and recordings.
+pub fn command(folder: &Path, arguments: &[impl AsRef<OsStr>]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mte-slam"));
+    command.args(arguments).current_dir(folder).stdin(Stdio::null()).env_remove("MTE_SLAM_DATA");
+    command
+}
+
+pub fn mte_slam(folder: &Path, arguments: &[impl AsRef<OsStr>]) -> Output {
+    command(folder, arguments).output().expect("the program starts")
 }
 
 pub fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-pub fn succeed(folder: &Path, arguments: &[&str]) -> Output {
+pub fn succeed(folder: &Path, arguments: &[impl AsRef<OsStr> + Debug]) -> Output {
     let output = mte_slam(folder, arguments);
     assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
     output
 }
 
-/// Run something that must fail with `code` and a message that holds all of `parts`, and must
-/// leave no output folder `out`.
-pub fn fail(folder: &Path, arguments: &[&str], code: i32, parts: &[&str]) {
+/// Runs something that must fail with `code` and a message that holds all of `parts`.
+pub fn refused(
+    folder: &Path,
+    arguments: &[impl AsRef<OsStr> + Debug],
+    code: i32,
+    parts: &[&str],
+) -> Output {
     let output = mte_slam(folder, arguments);
     let message = text(&output.stderr);
     assert_eq!(output.status.code(), Some(code), "{arguments:?}: {message}");
@@ -72,6 +81,12 @@ pub fn fail(folder: &Path, arguments: &[&str], code: i32, parts: &[&str]) {
         assert!(message.contains(part), "{arguments:?}: no {part:?} in {message:?}");
     }
     assert!(!message.contains("panicked"), "{message}");
+    output
+}
+
+/// [`refused`], with nothing on standard output and no output folder `out` left behind.
+pub fn fail(folder: &Path, arguments: &[&str], code: i32, parts: &[&str]) {
+    let output = refused(folder, arguments, code, parts);
     assert!(output.stdout.is_empty(), "{arguments:?}: {}", text(&output.stdout));
     assert!(!folder.join("out").exists(), "{arguments:?} left something behind");
 }
@@ -138,6 +153,11 @@ pub fn names(folder: &Path) -> Vec<String> {
 
 pub fn json_of(folder: &Path, arguments: &[&str]) -> Value {
     serde_json::from_slice(&succeed(folder, arguments).stdout).unwrap()
+}
+
+/// A JSON file.
+pub fn json(path: &Path) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
 }
 
 /// Labels of every frame changed by `change(pixel, raw id)`, in a folder `name`.

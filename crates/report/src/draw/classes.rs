@@ -141,7 +141,7 @@ fn cut(name: &str) -> String {
     name.chars().take(NAME - 2).chain("..".chars()).collect()
 }
 
-/// A line a class that occurs or is predicted; what is not known is empty. With `input`, the IoU
+/// One line per class that occurs or is predicted; what is not known is empty. With `input`, the IoU
 /// of the labels that the map learnt from.
 pub fn csv(figures: &SemanticFigures, input: Option<&SemanticFigures>) -> String {
     let mut text = String::from(

@@ -129,7 +129,7 @@ impl Synthetic {
         }
     }
 
-    /// A folder's name that tells all of it.
+    /// A folder's name that states all of it.
     pub fn folder_name(&self) -> String {
         let scene = self.scene.name();
         let noise = if self.depth_noise { "-noise" } else { "" };
@@ -138,7 +138,7 @@ impl Synthetic {
 }
 
 impl Suite {
-    /// Read a file, or take the included suite of that name.
+    /// Reads a file, or take the included suite of that name.
     pub fn read(path: &Path, program: &dyn Program) -> Result<Suite> {
         let name = path.display().to_string();
         if !path.exists()

@@ -55,7 +55,7 @@ impl DataRoot {
 pub enum State {
     /// All its files are there.
     Finished,
-    /// It left a checkpoint to go on from.
+    /// It left a checkpoint to resume from.
     Interrupted,
     /// There is nothing yet.
     Missing,
@@ -103,7 +103,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Work out every run; what is wrong with any of them is an error here.
+    /// Works out every run; what is wrong with any of them is an error here.
     pub fn new(suite: Suite, out: &Path, data: &DataRoot, program: &dyn Program) -> Result<Plan> {
         let mut runs = Vec::new();
         for &seed in &suite.seeds {
@@ -171,7 +171,7 @@ impl Plan {
         Ok(())
     }
 
-    /// Write what every run needs: built-in recordings, and the files of the runs.
+    /// Writes what every run needs: built-in recordings, and the files of the runs.
     pub fn prepare(&self, program: &dyn Program, note: &dyn Fn(&str)) -> Result<()> {
         for scene in &self.suite.scenes {
             let Some(synthetic) = scene.synthetic else { continue };

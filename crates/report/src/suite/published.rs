@@ -14,7 +14,7 @@ pub enum Kind {
     Reconstruction,
     /// mIoU by scene (Table IV).
     Semantics,
-    /// Seconds a frame (Table V).
+    /// Seconds per frame (Table V).
     Runtime,
     /// Modules on and off (Table VI).
     Ablation,

@@ -1,5 +1,5 @@
 //! The file of one run: a recording and options, so that `mte-slam run --from FILE` is all that
-//! any scheduler has to know. It is idempotent: it starts the run, goes on with it after an
+//! any scheduler has to know. It is idempotent: it starts the run, continues it after an
 //! interruption, or finds it finished and does nothing.
 use super::options;
 use crate::usage;
@@ -18,7 +18,7 @@ pub fn text(dataset: &str, options: &Table) -> Result<String> {
     let mut all = options.clone();
     all.insert(DATASET.to_owned(), Value::String(dataset.to_owned()));
     Ok(format!(
-        "# The inputs of one run. `mte-slam run --from` this file makes it, goes on with it, or\n\
+        "# The inputs of one run. `mte-slam run --from` this file starts it, continues it, or\n\
          # leaves it alone once it has finished. Relative paths start from this file's folder.\n{}",
         toml::to_string(&all)?
     ))
@@ -32,7 +32,7 @@ pub struct RunFile {
     pub options: Table,
 }
 
-/// Read one.
+/// Reads one.
 pub fn read(path: &Path) -> Result<RunFile> {
     let name = path.display();
     let text = match std::fs::read_to_string(path) {

@@ -135,7 +135,7 @@ pub struct Results {
 }
 
 impl Results {
-    /// Collect what is there. A file that cannot be read makes its run a failed one.
+    /// Collects what is there. A file that cannot be read makes its run a failed one.
     pub fn collect(plan: &Plan) -> Results {
         Results::of_runs(plan, plan.runs.iter().map(read_run).collect())
     }
@@ -165,7 +165,7 @@ impl Results {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }
 
-    /// The text of `results.csv`: a line a figure.
+    /// The text of `results.csv`: one line per figure.
     pub fn to_csv(&self) -> String {
         let mut text = String::from(
             "run,scene,preset,ablation,seed,state,program,config_hash,engine,adapter,figure,value,\

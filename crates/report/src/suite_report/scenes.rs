@@ -19,7 +19,7 @@ const SHEET_WIDTH: u32 = 1400;
 /// Class maps likewise.
 const MAP_WIDTH: u32 = 520;
 
-/// Pictures of every scene that has a finished run; `say` hears what cannot be shown.
+/// Pictures of every scene that has a finished run; `say` receives what cannot be shown.
 pub fn blocks(plan: &Plan, results: &Results, say: &mut dyn FnMut(String)) -> Vec<Block> {
     let mut blocks = Vec::new();
     let suite = &plan.suite;

@@ -61,7 +61,7 @@ pub fn blocks(plan: &Plan, results: &Results) -> Result<Vec<Block>> {
     section("Reconstruction (form of Table III)", surface, Kind::Reconstruction)?;
     let classes = t.by_scene("mIoU (%)", 2, |p| last(p) == "miou_percent");
     section("Semantic segmentation (form of Table IV)", classes, Kind::Semantics)?;
-    let mut times = t.by_figure("Seconds a frame, and memory", &t.time_columns());
+    let mut times = t.by_figure("Seconds per frame, and memory", &t.time_columns());
     times.iter_mut().for_each(|table| table.notes.extend(t.machines()));
     section("Runtime (form of Table V)", times, Kind::Runtime)?;
     section("Ablation (form of Table VI)", t.ablation(), Kind::Ablation)?;
@@ -147,7 +147,7 @@ impl Tables<'_> {
         self.text(&values, format)
     }
 
-    /// A table a measure, a column a scene, as the paper's I, II and IV.
+    /// One table per measure, one column per scene, as the paper's I, II and IV.
     fn by_scene(&self, what: &str, decimals: usize, wanted: fn(&str) -> bool) -> Vec<Table> {
         let table = |measure: Measure| {
             let format = (decimals, 1.0);
@@ -181,7 +181,7 @@ impl Tables<'_> {
         measures.into_iter().map(table).collect()
     }
 
-    /// One table, a column a measure, a row a scene and one for their mean, as the paper's III and V.
+    /// One table, a column per measure, a row per scene and one for their mean, as the paper's III and V.
     fn by_figure(&self, what: &str, columns: &[Column]) -> Vec<Table> {
         if columns.is_empty() {
             return Vec::new();
@@ -466,7 +466,7 @@ mod tests {
         let expected = ["fast", "base", "1.75 ± 0.35", "3.75 ± 0.35", "2.75 ± 0.35"];
         assert_eq!(tables[0].rows, [expected]);
         assert_eq!(tables[0].notes, ["Protocol: P in N views"]);
-        // A seed less of one scene is told, and is in no mean over scenes.
+        // A missing seed of one scene is marked, and is in no mean over scenes.
         let made = made_up(|run| {
             if run.scene == "b" && run.seed == 2 {
                 run.state = "missing";
