@@ -14,7 +14,6 @@ pub mod engine;
 pub mod field;
 pub mod kernel;
 pub mod kernels;
-pub mod keyframe;
 pub mod map;
 pub mod slam;
 pub mod track;

@@ -456,20 +456,25 @@ pub enum AblationRow {
     /// Both, but the fusion without its local module.
     NoLocal,
     /// Neither, and a perceptron 32-256-256-256-C on every sample instead of a head once per ray:
-    /// about a hundred times the work.
+    /// about a hundred times the work. Only builds with the feature `sample-head` have it.
     SampleHead,
 }
 
 impl AblationRow {
-    /// All of them, as the table shows them.
-    pub const ALL: [AblationRow; 6] = [
-        AblationRow::Neither,
-        AblationRow::Mtff,
-        AblationRow::Frs,
-        AblationRow::Both,
-        AblationRow::NoLocal,
-        AblationRow::SampleHead,
-    ];
+    /// All that this build has, as the table shows them.
+    pub fn all() -> Vec<AblationRow> {
+        let mut rows = vec![
+            AblationRow::Neither,
+            AblationRow::Mtff,
+            AblationRow::Frs,
+            AblationRow::Both,
+            AblationRow::NoLocal,
+        ];
+        if mte_slam_core::map::HAS_SAMPLE_HEAD {
+            rows.push(AblationRow::SampleHead);
+        }
+        rows
+    }
 }
 
 /// `ablate`.
@@ -487,7 +492,7 @@ pub struct AblateArgs {
         value_enum,
         value_name = "ROWS",
         value_delimiter = ',',
-        default_values_t = AblationRow::ALL
+        default_values_t = AblationRow::all()
     )]
     pub rows: Vec<AblationRow>,
     /// Output folder: empty, absent, or of an ablation that is to be continued [default:

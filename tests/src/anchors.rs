@@ -1,7 +1,7 @@
 //! Cases of the kernels on anchors.
 use crate::{
     Compare, TestRandom,
-    cases::{Case, SUMS},
+    case::{Case, SUMS},
     f32_words,
     fixture::{CLASSES, words},
     tokens::random,

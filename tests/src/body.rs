@@ -1,10 +1,9 @@
 //! The bodies of the consistency tests, which run natively and in a browser.
 use crate::{
     Tolerance,
-    cases::Case,
+    case::Case,
     compare_outputs,
     fixture::{POISON, run_words_async},
-    recorded::Outcome,
 };
 use mte_slam_core::{
     config::{Config, Tracker},
@@ -16,10 +15,13 @@ use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
 use mte_slam_types::{pose::Pose, sequence::Sequence};
 
 /// All buffers after a case.
+pub type Outcome = Vec<Vec<u32>>;
+
+/// Runs a case and returns all buffers afterwards.
 ///
 /// # Errors
 /// The engine's.
-pub async fn run_case(engine: &mut Engine, case: &Case) -> Result<Vec<Vec<u32>>, EngineError> {
+pub async fn run_case(engine: &mut Engine, case: &Case) -> Result<Outcome, EngineError> {
     run_words_async(engine, case.kernel, &case.params, &case.buffers, case.workgroups).await
 }
 

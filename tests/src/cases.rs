@@ -1,7 +1,9 @@
 //! Inputs of every kernel, made by the twins of the kernels before it, so that a mistake of one
 //! shader does not hide or excuse another's.
 use crate::{
-    Compare, TestRandom, anchors, f32_words,
+    Compare, TestRandom, anchors,
+    case::{Case, SUMS},
+    f32_words,
     fixture::{self, CLASSES, FRAMES, Options, POISON, State, words, workgroups},
     samples, tokens,
 };
@@ -37,29 +39,6 @@ use mte_slam_core::{
     },
     shaders::decoders::{COLOR, Layer, SEMANTIC},
 };
-
-/// One run of a kernel.
-pub struct Case {
-    /// What is special about it.
-    pub name: &'static str,
-    /// The kernel.
-    pub kernel: &'static Kernel,
-    /// Words of its parameters.
-    pub params: Vec<u32>,
-    /// Buffers in binding order.
-    pub buffers: Vec<Vec<u32>>,
-    /// Workgroups.
-    pub workgroups: [u32; 3],
-    /// How each binding may differ between engines.
-    pub tolerance: Vec<Compare>,
-    /// Bindings that the kernel overwrites completely.
-    pub overwritten: Vec<&'static str>,
-}
-
-/// How far the engines may be apart. Both compute in f32 with another order of sums and another
-/// exp, so: a few units of the last place (6e-8) times the number of terms behind a result
-/// (32 to 64 in a layer, three layers), relative to the largest value of the column.
-pub(crate) const SUMS: f32 = 2e-5;
 
 fn tolerance(name: &str) -> Compare {
     let columns = |row, bits, relative| Compare::Columns { row, bits, relative };

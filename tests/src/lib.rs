@@ -5,6 +5,7 @@ pub mod anchors;
 pub mod body;
 #[cfg(target_arch = "wasm32")]
 pub mod browser;
+pub mod case;
 pub mod cases;
 pub mod fixture;
 pub mod recorded;

@@ -1,8 +1,9 @@
 //! Inputs and results of all cases, and the poses of a short run, as bytes: what one world found,
 //! for another to compare with.
 use crate::{
-    body,
-    cases::{Case, cases},
+    body::{self, Outcome},
+    case::Case,
+    cases::cases,
 };
 use mte_slam_core::{
     engine::{Engine, EngineError},
@@ -11,9 +12,6 @@ use mte_slam_core::{
 };
 use mte_slam_types::pose::Pose;
 use pollster::block_on;
-
-/// All buffers after a case.
-pub type Outcome = Vec<Vec<u32>>;
 
 /// See the module.
 pub struct Recorded {

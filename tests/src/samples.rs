@@ -1,7 +1,7 @@
 //! Cases of the kernels of the per-sample class head.
 use crate::{
     Compare, TestRandom,
-    cases::{Case, SUMS},
+    case::{Case, SUMS},
     f32_words,
     fixture::{CLASSES, Options, POISON, State, words},
 };

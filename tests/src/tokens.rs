@@ -3,7 +3,7 @@
 //! workgroup's tokens.
 use crate::{
     Compare, TestRandom,
-    cases::{Case, SUMS},
+    case::{Case, SUMS},
     f32_words, fixture,
     fixture::{CLASSES, Options, POISON, State, words},
 };

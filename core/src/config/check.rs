@@ -1,5 +1,5 @@
 //! What a configuration must hold to make sense.
-use super::{Config, ConfigError};
+use super::{Config, ConfigError, Head};
 use crate::settings;
 use alloc::{format, string::ToString};
 
@@ -28,6 +28,13 @@ impl Config {
                     expected: "a whole fraction of field.surface_coarse_m".into(),
                 });
             }
+        }
+        if self.semantics.head == Head::Sample && !cfg!(feature = "sample-head") {
+            return Err(ConfigError::OutOfRange {
+                path: "semantics.head".into(),
+                found: "sample".into(),
+                expected: "ray, or a build with the feature `sample-head`".into(),
+            });
         }
         let m = &self.mapping;
         if m.rays < m.window {

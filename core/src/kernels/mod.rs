@@ -11,9 +11,9 @@ use crate::kernel::Kernel;
 
 /// Declares the kernel modules and lists their kernels.
 macro_rules! registry {
-    ($($(#[$doc:meta])* $module:ident: $id:ident),* $(,)?) => {
-        $($(#[$doc])* pub mod $module;)*
-        static ALL: &[&Kernel] = &[$(&$module::$id),*];
+    ($($(#[doc = $doc:literal])* $(#[cfg($cfg:meta)])? $module:ident: $id:ident),* $(,)?) => {
+        $($(#[doc = $doc])* $(#[cfg($cfg)])? pub mod $module;)*
+        static ALL: &[&Kernel] = &[$($(#[cfg($cfg)])? &$module::$id),*];
     };
 }
 
@@ -53,6 +53,7 @@ registry! {
     /// Nearest anchors of a ray's class and of another.
     match_rivals: MATCH_RIVALS,
     /// Layers on samples.
+    #[cfg(feature = "sample-head")]
     matrix_product: MATRIX_PRODUCT,
     /// Rays' pose gradients.
     pose_gradient: POSE_GRADIENT,
@@ -67,8 +68,10 @@ registry! {
     /// Sample placement.
     sample_depths: SAMPLE_DEPTHS,
     /// Semantic features of samples.
+    #[cfg(feature = "sample-head")]
     sample_features: SAMPLE_FEATURES,
     /// Classes from samples.
+    #[cfg(feature = "sample-head")]
     sample_logits: SAMPLE_LOGITS,
     /// Pixels and rays.
     sample_rays: SAMPLE_RAYS,

@@ -1,12 +1,11 @@
 //! The stored frames: images, poses and fused features, by slot.
-use super::{FrameFormat, Map};
 use crate::{
     camera::Camera,
     classes::UNLABELLED,
     commands::{Buffer, Commands},
     config::{Config, FusionConfig},
     engine::{Engine, EngineError},
-    frame::{FeatureMap, Frame},
+    frame::{FeatureMap, Frame, SequenceInfo},
     kernels::pose_step::POSE_STATE_FLOATS,
     layout::TARGET_FLOATS,
     pose::Pose,
@@ -16,6 +15,30 @@ use glam::{DMat3, DVec3};
 
 /// Floats of a pose.
 const POSE_FLOATS: usize = 12;
+
+/// What all frames of a sequence share, as far as buffers depend on it.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameFormat {
+    /// Camera of the images.
+    pub camera: Camera,
+    /// Metres per unit of depth.
+    pub depth_unit_m: f64,
+    /// Number of classes; 0 without labels.
+    pub classes: u32,
+    /// Channels of the feature maps that the fusion reads in place of label histograms; 0 without.
+    pub feature_channels: u32,
+}
+
+impl From<&SequenceInfo> for FrameFormat {
+    fn from(info: &SequenceInfo) -> FrameFormat {
+        FrameFormat {
+            camera: info.camera,
+            depth_unit_m: info.depth_unit_m,
+            classes: info.classes.len() as u32,
+            feature_channels: info.feature_channels as u32,
+        }
+    }
+}
 
 /// The grid of tokens over a frame.
 #[derive(Clone, Copy, Debug)]
@@ -187,13 +210,6 @@ impl FrameSlots {
     ) -> Result<Vec<f32>, EngineError> {
         let at = slot as usize * POSE_STATE_FLOATS;
         engine.read_as(self.pose_state, at, POSE_STATE_FLOATS).await
-    }
-}
-
-impl Map {
-    /// Number of slots of frames; slot 0 is for tracking and views.
-    pub fn slots(&self) -> u32 {
-        self.frames.count
     }
 }
 

@@ -3,7 +3,10 @@
 //! Kept are the map with Adam's moments, poses, counters, the odometer's numbers and the small
 //! depth images that meshes are culled with. Keyframes' images are not: they are read from the
 //! recording again (`resume.rs`), and each frame's hash tells whether it is the same recording.
-use super::{Observation, PoseEstimate, Slam, SlamError, TrackingStatus};
+use super::{
+    PoseEstimate, Slam, SlamError, TrackingStatus,
+    keyframes::{Observation, observation_step},
+};
 use crate::{
     camera::Camera,
     classes::ClassTable,
@@ -227,8 +230,7 @@ impl Slam {
         let statuses: Vec<u32> = self.frames.iter().map(|f| f.status as u32).collect();
         tensors.push(tensor("frames.status", Dtype::U32, vec![n], &statuses));
         tensors.push(tensor("frames.hash", Dtype::U64, vec![n], &self.hashes));
-        let camera =
-            self.info.camera.downscaled(super::mapping::observation_step(self.info.camera.width));
+        let camera = self.info.camera.downscaled(observation_step(self.info.camera.width));
         let (w, h) = (camera.width as usize, camera.height as usize);
         let mut depths = Vec::with_capacity(w * h * self.observations.len());
         self.observations.iter().for_each(|o| depths.extend_from_slice(&o.depth));
@@ -345,7 +347,7 @@ impl Checkpoint {
             });
         }
         let camera = state.sequence.camera;
-        let small = camera.downscaled(super::mapping::observation_step(camera.width)).pixels();
+        let small = camera.downscaled(observation_step(camera.width)).pixels();
         let observed = &state.observed_frames;
         let depths: Vec<u16> =
             self.values("observations.depth", Dtype::U16, small.saturating_mul(observed.len()))?;

@@ -1,6 +1,9 @@
 //! A mesh that follows the map while it grows: only the parts that new frames have touched are
 //! extracted again, in chunks that a viewer can replace one by one.
-use super::{Observation, PoseEstimate, Slam, SlamError, mapping::observation_step};
+use super::{
+    PoseEstimate, Slam, SlamError,
+    keyframes::{Observation, observation_step},
+};
 use crate::{
     camera::Camera,
     classes::UNLABELLED,

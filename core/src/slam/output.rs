@@ -1,5 +1,5 @@
 //! What comes out of a map: rendered views and meshes.
-use super::{Slam, SlamError, VIEW_SLOT, mapping::observation_step};
+use super::{Slam, SlamError, keyframes::observation_step, system::VIEW_SLOT};
 use crate::{
     camera::Camera,
     classes::UNLABELLED,

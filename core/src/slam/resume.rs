@@ -1,7 +1,8 @@
 //! A run again from its checkpoint: to be shown, or to go on.
 use super::{
-    Slam, SlamError,
+    MapKeyframe, Slam, SlamError,
     checkpoint::{Checkpoint, Dtype, Saved, SequenceState, wrong},
+    class_counts::ClassCounts,
 };
 use crate::{
     commands::Commands,
@@ -9,7 +10,6 @@ use crate::{
     engine::Engine,
     field::FieldShape,
     frame::{Frame, SequenceInfo},
-    keyframe::Keyframe,
     map::{FrameFormat, Map, Scratch, color_words},
     track::odometry::{ColorRegistration, Rebuild, since},
 };
@@ -202,7 +202,7 @@ fn build(
     slam.mapping_calls = state.mapping_calls;
     slam.finished_iterations = state.finished_iterations;
     slam.bounds_refused = state.bounds_refused;
-    slam.class_counts = super::semantics::ClassCounts(state.class_counts.clone());
+    slam.class_counts = ClassCounts(state.class_counts.clone());
     slam.free_slots.clone_from(&state.free_slots);
     slam.used_slots = state.used_slots;
     slam.anchor_history.clone_from(&state.anchor_history);
@@ -211,7 +211,11 @@ fn build(
     slam.keyframes = state
         .keyframes
         .iter()
-        .map(|k| Keyframe { frame: k.frame, slot: k.slot, world_from_camera: k.world_from_camera })
+        .map(|k| MapKeyframe {
+            frame: k.frame,
+            slot: k.slot,
+            world_from_camera: k.world_from_camera,
+        })
         .collect();
     Ok(slam)
 }

@@ -1,6 +1,12 @@
 //! The loop as a whole, on small frames of the built-in room.
 use super::*;
-use crate::{camera::Camera, sequence::Sequence};
+use crate::{
+    camera::Camera,
+    config::Config,
+    engine::Engine,
+    frame::{Frame, SequenceInfo},
+    sequence::Sequence,
+};
 use alloc::{vec, vec::Vec};
 use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
 use pollster::block_on;

@@ -1,4 +1,7 @@
-//! Recordings on disk, in an archive or in a browser, by the layout of their files.
+#![doc = include_str!("../README.md")]
+//! # Layouts
+//!
+//! A recording is recognised by the layout of its files, on disk, in an archive or in a browser:
 //!
 #![doc = include_str!("layouts.md")]
 //!

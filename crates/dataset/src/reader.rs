@@ -22,6 +22,7 @@ const MIN_SIDE: u32 = 8;
 
 /// Where labels come from.
 #[derive(Default)]
+#[non_exhaustive]
 pub enum LabelSource {
     /// No labels.
     None,

@@ -35,6 +35,7 @@ impl CullingView<'_> {
 
 /// What counts as observed.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum CullProtocol {
     /// ESLAM's: a vertex falls on a pixel with sensor depth, no deeper than that depth plus the
     /// truncation \[m\] (0.06). Pixels without sensor depth observe nothing.

@@ -1,5 +1,5 @@
-//! Triangle meshes: extraction from a signed distance in blocks, culling to what was observed,
-//! and the bytes of PLY and GLB files.
+#![doc = include_str!("../README.md")]
+//! # Conventions
 //!
 //! A mesh lives in the world frame of the poses it was made with \[m\]; triangles wind
 //! counter-clockwise seen from the free side (where the signed distance is positive).
@@ -31,6 +31,7 @@ use mte_slam_types::pose::Pose;
 
 /// Why a mesh could not be made or written.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MeshError {
     /// Something has a size or value that cannot be worked with.
     #[error("{what}: found {found}, expected {expected}")]

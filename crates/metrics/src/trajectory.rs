@@ -9,6 +9,7 @@ use serde::Serialize;
 
 /// Why a trajectory error cannot be said.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TrajectoryError {
     /// Too few pairs for the figure.
     #[error("{what}: found {found} pairs of poses, expected at least {expected}")]

@@ -1,4 +1,5 @@
-//! RGB-D alignment on the host: where every frame's pose starts.
+#![doc = include_str!("../README.md")]
+//! # How it works
 //!
 //! [`align`] estimates one pose from one or several reference images at once (projective
 //! point-to-plane plus photometric residuals, coarse to fine, robust); [`Odometer`] decides what to
@@ -36,6 +37,7 @@ mod tests;
 
 /// Why an alignment could not even be tried.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum OdometryError {
     /// An image does not have the size of the camera.
     #[error("frame {frame}: {image}: found {found} pixels, expected {expected}")]

@@ -18,6 +18,7 @@ use serde::{Deserialize, Serialize};
 
 /// Why a frame counts as lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum LostReason {
     /// The frame has next to no depth.
     NoDepth,

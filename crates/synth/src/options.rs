@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 /// Which scene to build.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum SceneKind {
     /// A living room of 5 x 4.5 x 2.6 m.
     #[default]

@@ -176,8 +176,10 @@ mod tests {
         assert!(!solve_cholesky(&mut [-1.0], &mut [1.0], 0.0));
         assert!(!solve_cholesky(&mut [f64::NAN], &mut [1.0], 0.0));
         let nearly_singular = [1.0, 1.0, 1.0, 1.0 + 1e-14];
-        assert!(solve_cholesky(&mut nearly_singular.clone(), &mut [1.0, 1.0], 0.0));
-        assert!(!solve_cholesky(&mut nearly_singular.clone(), &mut [1.0, 1.0], 1e-12));
+        for (least_pivot, solved) in [(0.0, true), (1e-12, false)] {
+            let (mut a, mut b) = (nearly_singular, [1.0, 1.0]);
+            assert_eq!(solve_cholesky(&mut a, &mut b, least_pivot), solved, "{least_pivot}");
+        }
     }
 
     #[test]

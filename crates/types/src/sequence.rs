@@ -7,6 +7,7 @@ use alloc::{format, string::String, vec::Vec};
 
 /// Why a recording could not be read. Every variant names the file (or the folder) it is about.
 #[derive(Clone, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SequenceError {
     /// A file is missing or its bytes could not be had.
     #[error("{file}: cannot be read: {reason}")]

@@ -25,6 +25,7 @@ use crate::{
 use anyhow::{Context, Result, bail};
 use mte_slam_core::{
     config::{Config, Head, Inference},
+    map::HAS_SAMPLE_HEAD,
     slam::TrackingStatus,
 };
 use mte_slam_run::{Log, Run};
@@ -86,6 +87,9 @@ pub fn run(args: &AblateArgs, screen: Screen) -> Result<()> {
     let rows = &args.rows;
     if let Some((i, row)) = rows.iter().enumerate().find(|(i, row)| rows[..*i].contains(row)) {
         usage!("--rows: found {row:?} twice (entry {}), expected every row once", i + 1);
+    }
+    if rows.contains(&AblationRow::SampleHead) && !HAS_SAMPLE_HEAD {
+        usage!("--rows sample-head: expected a build with the feature `sample-head`");
     }
     let Prepared { mut sequence, effective, mut class_truth, record } =
         input::prepare(&args.dataset, &args.selection, &args.config, screen)?;

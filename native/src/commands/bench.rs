@@ -21,7 +21,8 @@ use mte_slam_core::{
     field::FieldShape,
     kernels::shared::{FLAG_GUIDED, FLAG_MAP, FLAG_MASK, FLAG_POSE},
     map::{
-        Batch, FrameFormat, Map, Rates, Scratch, SemanticSupervision, fusion, passes, suppressor,
+        Batch, FrameFormat, HAS_SAMPLE_HEAD, Map, Rates, Scratch, SemanticSupervision, fusion,
+        passes, suppressor,
     },
 };
 use mte_slam_types::{
@@ -144,7 +145,7 @@ pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
     let (points, align_ms) = measure_align(&mut bench, &config, args.iterations)?;
     let bytes = bench.engine.allocated_bytes();
     drop(bench);
-    let semantic = (!args.no_baseline)
+    let semantic = (HAS_SAMPLE_HEAD && !args.no_baseline)
         .then(|| measure_semantic_path(&config, &args.engine, args.iterations, screen))
         .transpose()?;
 
@@ -179,6 +180,8 @@ pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
     );
     if let Some(semantic) = &semantic {
         describe_semantic_path(&mut text, semantic);
+    } else if !HAS_SAMPLE_HEAD {
+        text += "\nsemantic path: a build with the feature `sample-head` compares two heads\n";
     }
     let json = serde_json::json!({
         "engine": chosen.record,

@@ -2,11 +2,11 @@
 
 /// Declares the modules and lists their interfaces.
 macro_rules! registry {
-    ($($(#[$doc:meta])* $module:ident),* $(,)?) => {
-        $($(#[$doc])* pub mod $module;)*
+    ($($(#[doc = $doc:literal])* $(#[cfg($cfg:meta)])? $module:ident),* $(,)?) => {
+        $($(#[doc = $doc])* $(#[cfg($cfg)])? pub mod $module;)*
 
         /// All interfaces, by name.
-        pub static ALL: &[&crate::interface::Interface] = &[$(&$module::INTERFACE),*];
+        pub static ALL: &[&crate::interface::Interface] = &[$($(#[cfg($cfg)])? &$module::INTERFACE),*];
     };
 }
 
@@ -46,6 +46,7 @@ registry! {
     /// Nearest anchors of a ray's class and of another.
     match_rivals,
     /// Layers on samples.
+    #[cfg(feature = "sample-head")]
     matrix_product,
     /// Rays' pose gradients.
     pose_gradient,
@@ -60,8 +61,10 @@ registry! {
     /// Sample placement.
     sample_depths,
     /// Semantic features of samples.
+    #[cfg(feature = "sample-head")]
     sample_features,
     /// Classes from samples.
+    #[cfg(feature = "sample-head")]
     sample_logits,
     /// Pixels and rays.
     sample_rays,

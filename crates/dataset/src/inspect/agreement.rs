@@ -34,6 +34,7 @@ const SURFACE: f64 = 0.05;
 /// What the numbers of a pose are taken for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum PoseReading {
     /// As the reader takes them.
     AsGiven,

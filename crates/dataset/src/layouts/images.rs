@@ -22,7 +22,8 @@ impl LayoutFiles for Images {
 
     fn parts(&self) -> Parts {
         Parts {
-            color: "`color/*`, `rgb/*`, `images/*`",
+            about: "",
+            color: "`color/`, `rgb/` or `images/`",
             depth: "`depth/*.png`, mm unless the camera says",
             poses: "`pose/0.txt`, `traj.txt`, `poses.txt`",
             labels: "`semantic_class/`",

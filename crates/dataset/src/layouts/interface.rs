@@ -7,6 +7,8 @@ pub(crate) type Mark = (&'static str, usize);
 
 /// Where the parts of a recording lie, as the documentation's table shows it (in Markdown).
 pub(crate) struct Parts {
+    /// What the name leaves open, or nothing.
+    pub about: &'static str,
     /// Colour images.
     pub color: &'static str,
     /// Depth images and their unit.

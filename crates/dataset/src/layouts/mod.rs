@@ -1,7 +1,8 @@
 //! The layouts of recordings and how they are recognised.
 //!
 //! To add a layout: a file here with a type that implements [`LayoutFiles`], its `mod` line, and
-//! its line in the registry below. Names, errors and the table of the documentation follow.
+//! its line in the registry below. Names and errors follow; a test compares the tables of the
+//! documentation (`layouts.md`, and the guide's) with what the layouts say of themselves.
 mod images;
 mod interface;
 mod nerfstudio;
@@ -65,12 +66,16 @@ impl Layout {
     /// Returns a table of all layouts in Markdown: where each has its parts.
     pub fn table() -> String {
         let mut table = String::from(
-            "| layout | colour | depth | poses | labels |\n| --- | --- | --- | --- | --- |\n",
+            "| layout | color | depth | poses | labels |\n| --- | --- | --- | --- | --- |\n",
         );
         for layout in Layout::ALL {
             let parts = layout.files().parts();
             let cells = [parts.color, parts.depth, parts.poses, parts.labels].join(" | ");
-            table += &format!("| `{layout}` | {cells} |\n");
+            let about = match parts.about {
+                "" => String::new(),
+                about => format!(" ({about})"),
+            };
+            table += &format!("| `{layout}`{about} | {cells} |\n");
         }
         table
     }

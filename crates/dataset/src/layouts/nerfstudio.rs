@@ -30,9 +30,10 @@ impl LayoutFiles for Nerfstudio {
 
     fn parts(&self) -> Parts {
         Parts {
+            about: "",
             color: "`transforms.json`",
             depth: "there, mm unless it says",
-            poses: "there (OpenGL axes)",
+            poses: "there, OpenGL axes",
             labels: "`semantic_class/`",
         }
     }

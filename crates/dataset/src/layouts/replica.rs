@@ -18,6 +18,7 @@ impl LayoutFiles for Replica {
 
     fn parts(&self) -> Parts {
         Parts {
+            about: "NICE-SLAM's render",
             color: "`results/frame000000.jpg`",
             depth: "`results/depth000000.png`, 1/6553.5 m",
             poses: "`traj.txt`",

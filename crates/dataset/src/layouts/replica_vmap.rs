@@ -19,6 +19,7 @@ impl LayoutFiles for ReplicaVmap {
 
     fn parts(&self) -> Parts {
         Parts {
+            about: "vMAP's render",
             color: "`rgb/rgb_0.png`",
             depth: "`depth/depth_0.png`, mm",
             poses: "`traj.txt`, `traj_w_c.txt`",

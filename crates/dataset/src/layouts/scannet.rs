@@ -19,6 +19,7 @@ impl LayoutFiles for ScanNet {
 
     fn parts(&self) -> Parts {
         Parts {
+            about: "exported",
             color: "`color/0.jpg`",
             depth: "`depth/0.png`, mm",
             poses: "`pose/0.txt`",

@@ -28,10 +28,11 @@ impl LayoutFiles for Sens {
 
     fn parts(&self) -> Parts {
         Parts {
-            color: "in `NAME.sens`",
-            depth: "there, in its unit",
-            poses: "there",
-            labels: "`label-filt/0.png`",
+            about: "ScanNet, packed",
+            color: "in the file, streamed",
+            depth: "in the file, in its unit",
+            poses: "in the file",
+            labels: "`label-filt/0.png` beside it",
         }
     }
 

@@ -18,6 +18,7 @@ impl LayoutFiles for SevenScenes {
 
     fn parts(&self) -> Parts {
         Parts {
+            about: "",
             color: "`frame-000000.color.png`",
             depth: "`frame-000000.depth.png`, mm",
             poses: "`frame-000000.pose.txt`",

@@ -27,6 +27,7 @@ impl LayoutFiles for Tum {
 
     fn parts(&self) -> Parts {
         Parts {
+            about: "",
             color: "`rgb.txt`",
             depth: "`depth.txt`, 1/5000 m",
             poses: "`groundtruth.txt`",

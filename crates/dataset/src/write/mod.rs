@@ -40,6 +40,7 @@ impl ColorFormat {
 
 /// Why a frame could not be written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum WriteError {
     /// The sink refused a file.
     #[error("{file}: cannot be written: {source}")]

@@ -183,6 +183,12 @@ macro_rules! choices {
                     $(list.choice(path, $text, &[$($doc),+]);)+
                 }
             }
+
+            impl ::serde::Serialize for $name {
+                fn serialize<S: ::serde::Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
+                    s.serialize_str([$($text),+][*self as usize])
+                }
+            }
         };
     )+};
 }

@@ -1,23 +1,12 @@
-//! Frames kept for mapping: which there are, which overlap the current view, which to drop.
+//! Surface points that a frame sees.
 use crate::{camera::Camera, frame::Frame, kernels::shared::random_u32, pose::Pose};
 use alloc::vec::Vec;
 use glam::DVec3;
 use mte_slam_shaders::random::salt;
 
-/// A frame whose images are kept on the device.
-#[derive(Clone, Debug)]
-pub struct Keyframe {
-    /// `Frame::index`.
-    pub frame: usize,
-    /// Where its images lie on the device.
-    pub slot: u32,
-    /// Its present pose.
-    pub world_from_camera: Pose,
-}
-
 /// Camera-frame points of about `count` pixels with depth, on a jittered grid: x, y, z \[m\] and
 /// intensity in 0..1.
-pub fn sample_points(
+pub(super) fn sample_points(
     frame: &Frame,
     camera: &Camera,
     depth_unit_m: f64,
@@ -49,7 +38,7 @@ pub fn sample_points(
 }
 
 /// Share of world points that a camera sees (frustum only), 0 without points.
-pub fn overlap(points_world: &[DVec3], camera: &Camera, world_from_camera: &Pose) -> f64 {
+pub(super) fn overlap(points_world: &[DVec3], camera: &Camera, world_from_camera: &Pose) -> f64 {
     if points_world.is_empty() {
         return 0.0;
     }
@@ -63,24 +52,4 @@ pub fn overlap(points_world: &[DVec3], camera: &Camera, world_from_camera: &Pose
         })
     });
     seen.count() as f64 / points_world.len() as f64
-}
-
-/// Index of the keyframe that says least: the one closest to another (metres plus radians),
-/// never the first nor the last two. `None` with fewer than four.
-pub fn least_useful(keyframes: &[Keyframe]) -> Option<usize> {
-    let distance = |a: &Pose, b: &Pose| {
-        (a.translation - b.translation).length() + a.inverse().compose(b).angle_rad()
-    };
-    (1..keyframes.len().saturating_sub(2))
-        .map(|i| {
-            let nearest = keyframes
-                .iter()
-                .enumerate()
-                .filter(|(j, _)| *j != i)
-                .map(|(_, k)| distance(&k.world_from_camera, &keyframes[i].world_from_camera))
-                .fold(f64::INFINITY, f64::min);
-            (i, nearest)
-        })
-        .min_by(|a, b| a.1.total_cmp(&b.1))
-        .map(|(i, _)| i)
 }

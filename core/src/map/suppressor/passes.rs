@@ -1,9 +1,9 @@
-//! Feature redundancy suppressor (paper III-B): the anchors, and the passes that move them.
-use super::{Batch, Map, Scratch};
+//! The passes of the suppressor over a batch of rays.
+use super::AnchorCounts;
 use crate::{
     call::Call,
-    commands::{Buffer, Commands},
-    config::{AnchorRule, SuppressorConfig},
+    commands::Commands,
+    config::AnchorRule,
     engine::{Engine, EngineError},
     kernels::{
         maintain_anchors::{self, MaintainAnchorsParams},
@@ -11,69 +11,14 @@ use crate::{
         settle_anchors::{self, SettleAnchorsParams},
         update_anchors::{self, UpdateAnchorsParams},
     },
-    layout::{ANCHOR_FLOATS, NO_DISTANCE},
+    layout::NO_DISTANCE,
+    map::{Batch, Map, Scratch},
 };
 use alloc::{vec, vec::Vec};
-use serde::{Deserialize, Serialize};
 
 /// How sharply the settling of anchors attends to rays that are mistaken, or nearly so: with less, rays
 /// well inside a common class wear the border to a rare one down.
 const SETTLE_SLOPE: f32 = 400.0;
-
-/// Buffers of the suppressor.
-pub struct Suppressor {
-    /// Anchors, [`ANCHOR_FLOATS`] each.
-    pub anchors: Buffer<[f32; 4]>,
-    /// Votes of the matched rays' labels, one float per slot and class.
-    pub votes: Buffer<f32>,
-    pub(super) counts: Buffer<u32>,
-    /// Since the anchors began to settle: rays of each class of the head whose labels agree, and do not.
-    pub(super) support: Buffer<u32>,
-    config: SuppressorConfig,
-}
-
-/// What the suppressor did so far.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct AnchorCounts {
-    /// Anchors in use.
-    pub alive: u32,
-    /// Anchors made, the first ones among them.
-    pub spawned: u32,
-    /// Anchors dropped as unimportant.
-    pub dropped: u32,
-    /// Anchors merged into a duplicate.
-    pub merged: u32,
-}
-
-impl Suppressor {
-    pub(super) fn new(
-        e: &mut Engine,
-        config: &SuppressorConfig,
-        classes: u32,
-    ) -> Result<Suppressor, EngineError> {
-        let n = config.anchors as usize;
-        let s = Suppressor {
-            anchors: e.create("anchors", n * ANCHOR_FLOATS)?,
-            votes: e.create("votes", n * classes as usize)?,
-            counts: e.create("anchor counts", 4)?,
-            support: e.create("class support", 2 * classes as usize)?,
-            config: config.clone(),
-        };
-        let mut free = vec![0_u32; n * ANCHOR_FLOATS];
-        for a in free.chunks_exact_mut(ANCHOR_FLOATS) {
-            a[16] = 255;
-        }
-        let mut r = Commands::default();
-        r.upload(s.anchors, 0, &free);
-        e.submit(&r)?;
-        Ok(s)
-    }
-
-    /// Slots of anchors.
-    pub fn slots(&self) -> u32 {
-        self.config.anchors
-    }
-}
 
 /// Moves the anchors to the features of the last forward pass.
 ///

@@ -1,11 +1,8 @@
-//! The per-sample class head, built as SNI-SLAM's: what deferred decoding is measured against.
-//!
-//! Samples go through the perceptron in parts of the batch, so that its activations fit a binding
-//! whatever the batch; each part's gradients are added to the same rows of partial sums.
-use super::{Map, ParameterTensor, Rates, Scratch, parameters::AdamStep};
+//! The passes of the per-sample class head.
+use super::head::{INPUTS, PART, SPLITS, VIEW_SLOTS};
 use crate::{
     call::Call,
-    commands::{Buffer, Commands},
+    commands::Commands,
     engine::{Engine, EngineError},
     kernels::{
         matrix_product::{self, MatrixProductParams, NO_SUMS},
@@ -13,138 +10,31 @@ use crate::{
         sample_features,
         sample_logits::{self, SampleLogitsParams},
         scatter_geometry,
-        shared::{FLAG_DENSE, RAY_WORDS, random_f32},
+        shared::{FLAG_DENSE, RAY_WORDS},
     },
-    layout::{CHANNELS, FieldParams, RAY_OUT_FLOATS},
+    layout::{FieldParams, RAY_OUT_FLOATS},
+    map::{Map, Rates, Scratch, parameters::AdamStep},
 };
 use alloc::{vec, vec::Vec};
 use core::ops::Range;
-use mte_slam_shaders::random::{first_values, salt};
-#[cfg(not(feature = "std"))]
-use num_traits::Float as _;
-
-/// Units of each hidden layer.
-const HIDDEN: u32 = 256;
-/// Inputs: the semantic features of a sample, coarse and fine.
-const INPUTS: u32 = 2 * CHANNELS as u32;
-/// Samples that go through the perceptron at once.
-const PART: u32 = 8192;
-/// Rows of partial sums of the weights' gradients.
-const SPLITS: u32 = 4;
-/// Samples per ray of a view: the first intervals that carry weight. Behind them next to no light
-/// is left; on the others the head would run for nothing.
-const VIEW_SLOTS: u32 = 24;
-
-/// A layer: weights input-major, then biases.
-#[derive(Clone, Copy, Debug)]
-pub struct SampleLayer {
-    /// Inputs.
-    pub inputs: u32,
-    /// Outputs.
-    pub outputs: u32,
-    /// First weight in the parameters.
-    pub weights: u32,
-}
-
-impl SampleLayer {
-    /// First bias in the parameters.
-    pub fn bias(&self) -> u32 {
-        self.weights + self.inputs * self.outputs
-    }
-}
-
-/// The parameters of the head.
-pub struct SampleHead {
-    /// Weights and biases of all layers.
-    pub parameters: ParameterTensor,
-    /// 32-256-256-256-C.
-    pub layers: [SampleLayer; 4],
-}
-
-/// Activations and gradients of the head.
-pub struct SampleScratch {
-    features: Buffer<[f32; 4]>,
-    feature_gradient: Buffer<[f32; 4]>,
-    slot_depths: Buffer<f32>,
-    slot_weights: Buffer<f32>,
-    /// Outputs of the layers for a part's samples; the last are the logits, then their gradients.
-    outputs: [Buffer<f32>; 4],
-    /// Gradients at hidden layers, taking turns.
-    deltas: [Buffer<f32>; 2],
-    partials: Buffer<f32>,
-    no_mask: Buffer<f32>,
-}
-
-impl SampleHead {
-    pub(super) fn new(e: &mut Engine, classes: u32, seed: u32) -> Result<SampleHead, EngineError> {
-        let mut weights = 0;
-        let sizes = [INPUTS, HIDDEN, HIDDEN, HIDDEN, classes];
-        let layers = core::array::from_fn(|i| {
-            let layer = SampleLayer { inputs: sizes[i], outputs: sizes[i + 1], weights };
-            weights = layer.bias() + layer.outputs;
-            layer
-        });
-        let floats = weights as usize;
-        let parameters = ParameterTensor::new(e, "sample head", floats)?;
-        let head = SampleHead { parameters, layers };
-        let mut w = vec![0.0_f32; floats];
-        for layer in &head.layers {
-            let limit = (6.0 / layer.inputs as f32).sqrt();
-            for i in layer.weights..layer.bias() {
-                w[i as usize] =
-                    (2.0 * random_f32(
-                        seed,
-                        first_values::SAMPLE_HEAD,
-                        i,
-                        salt::SAMPLE_HEAD_AS_KEYFRAME_POINT,
-                    ) - 1.0)
-                        * limit;
-            }
-        }
-        let mut r = Commands::default();
-        r.upload(head.parameters.values, 0, &w);
-        e.submit(&r)?;
-        Ok(head)
-    }
-}
-
-impl SampleScratch {
-    /// `trained` is the most samples of a training batch, `rays` the most rays of any.
-    pub(super) fn new(
-        e: &mut Engine,
-        head: &SampleHead,
-        classes: u32,
-        trained: usize,
-        rays: usize,
-    ) -> Result<SampleScratch, EngineError> {
-        let slots = trained.max(rays * VIEW_SLOTS as usize);
-        let hidden = |e: &mut Engine, name| e.create(name, (PART * HIDDEN) as usize);
-        let partials = SPLITS as usize * head.parameters.floats;
-        Ok(SampleScratch {
-            features: e.create("sample features", slots * INPUTS as usize)?,
-            feature_gradient: e.create("sample feature gradients", trained * INPUTS as usize)?,
-            slot_depths: e.create("slot depths", slots)?,
-            slot_weights: e.create("slot weights", slots)?,
-            outputs: [
-                hidden(e, "sample layer 1")?,
-                hidden(e, "sample layer 2")?,
-                hidden(e, "sample layer 3")?,
-                e.create("sample logits", (PART * classes) as usize)?,
-            ],
-            deltas: [hidden(e, "sample deltas 1")?, hidden(e, "sample deltas 2")?],
-            partials: e.create("sample head partials", partials)?,
-            no_mask: e.create("no mask", 4)?,
-        })
-    }
-}
 
 /// Classes (and, with labels, the loss) of the batch's rays.
-pub(super) fn record_classes(r: &mut Commands, map: &Map, scratch: &Scratch, p: &FieldParams) {
+pub(in crate::map) fn record_classes(
+    r: &mut Commands,
+    map: &Map,
+    scratch: &Scratch,
+    p: &FieldParams,
+) {
     record_head(r, map, scratch, p, false);
 }
 
 /// Classes, loss and all gradients of the head and the semantic planes.
-pub(super) fn record_backward(r: &mut Commands, map: &Map, scratch: &Scratch, p: &FieldParams) {
+pub(in crate::map) fn record_backward(
+    r: &mut Commands,
+    map: &Map,
+    scratch: &Scratch,
+    p: &FieldParams,
+) {
     record_head(r, map, scratch, p, true);
 }
 
@@ -337,7 +227,7 @@ fn record_part(
 }
 
 /// The head's part of step `number` of the map.
-pub(super) fn record_step(r: &mut Commands, map: &Map, rates: Rates, number: u32) {
+pub(in crate::map) fn record_step(r: &mut Commands, map: &Map, rates: Rates, number: u32) {
     let Some(h) = &map.sample_head else { return };
     let floats = 0..h.parameters.floats;
     let step = AdamStep { floats, quanta: None, rate: rates.decoders, number };
@@ -345,7 +235,7 @@ pub(super) fn record_step(r: &mut Commands, map: &Map, rates: Rates, number: u32
 }
 
 /// Classes at points: each is a ray of one sample that carries all weight.
-pub(super) async fn classes_at(
+pub(in crate::map) async fn classes_at(
     engine: &mut Engine,
     map: &Map,
     scratch: &Scratch,
