@@ -5,7 +5,7 @@ use super::{
     results::{Results, RunResult},
 };
 use crate::{
-    output::ablation::OverSeeds,
+    ablation::OverSeeds,
     suite::{
         plan::Plan,
         published::{self, Kind},
@@ -21,18 +21,18 @@ const DASH: &str = "-";
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Measure {
     path: String,
-    /// As [`without_counts`] gives it.
-    protocol: String,
+    protocol_id: String,
 }
 
 impl Measure {
     fn of(&self, run: &RunResult) -> Option<f64> {
         let figure = run.figures.get(&self.path)?;
-        (without_counts(&figure.protocol) == self.protocol).then_some(figure.value)
+        (figure.protocol_id == self.protocol_id).then_some(figure.value)
     }
 }
 
-/// A protocol with the number of views left out, which differs from scene to scene.
+/// A sentence with the number of views left out, which differs from scene to scene; for people
+/// alone.
 fn without_counts(protocol: &str) -> String {
     let words: Vec<&str> = protocol.split(' ').collect();
     let keep = |i: usize| {
@@ -61,7 +61,7 @@ pub fn blocks(plan: &Plan, results: &Results) -> Result<Vec<Block>> {
     section("Reconstruction (form of Table III)", surface, Kind::Reconstruction)?;
     let classes = t.by_scene("mIoU (%)", 2, |p| last(p) == "miou_percent");
     section("Semantic segmentation (form of Table IV)", classes, Kind::Semantics)?;
-    let mut times = t.by_figure("Seconds a frame, and memory", &t.time_columns());
+    let mut times = t.by_figure("Seconds per frame, and memory", &t.time_columns());
     times.iter_mut().for_each(|table| table.notes.extend(t.machines()));
     section("Runtime (form of Table V)", times, Kind::Runtime)?;
     section("Ablation (form of Table VI)", t.ablation(), Kind::Ablation)?;
@@ -88,7 +88,7 @@ impl Tables<'_> {
             .finished()
             .flat_map(|r| &r.figures)
             .filter(|(path, _)| wanted(path))
-            .map(|(path, f)| Measure { path: path.clone(), protocol: without_counts(&f.protocol) })
+            .map(|(path, f)| Measure { path: path.clone(), protocol_id: f.protocol_id.clone() })
             .collect();
         all.into_iter().collect()
     }
@@ -147,7 +147,7 @@ impl Tables<'_> {
         self.text(&values, format)
     }
 
-    /// A table a measure, a column a scene, as the paper's I, II and IV.
+    /// One table per measure, one column per scene, as the paper's I, II and IV.
     fn by_scene(&self, what: &str, decimals: usize, wanted: fn(&str) -> bool) -> Vec<Table> {
         let table = |measure: Measure| {
             let format = (decimals, 1.0);
@@ -181,19 +181,19 @@ impl Tables<'_> {
         measures.into_iter().map(table).collect()
     }
 
-    /// One table, a column a measure, a row a scene and one for their mean, as the paper's III and V.
+    /// One table, a column per measure, a row per scene and one for their mean, as the paper's III and V.
     fn by_figure(&self, what: &str, columns: &[Column]) -> Vec<Table> {
         if columns.is_empty() {
             return Vec::new();
         }
-        let mut protocols: Vec<String> = Vec::new();
+        let mut protocols: Vec<(&str, String)> = Vec::new();
         let mut head = vec!["preset".to_owned(), "ablation".to_owned(), "scene".to_owned()];
         for column in columns {
-            let protocol = self.protocol(&column.measure);
-            let number = match protocols.iter().position(|p| *p == protocol) {
+            let id = column.measure.protocol_id.as_str();
+            let number = match protocols.iter().position(|(known, _)| *known == id) {
                 Some(i) => i + 1,
                 None => {
-                    protocols.push(protocol);
+                    protocols.push((id, self.protocol(&column.measure)));
                     protocols.len()
                 }
             };
@@ -218,7 +218,8 @@ impl Tables<'_> {
                 rows.push(row);
             }
         }
-        let notes = protocols.iter().enumerate().map(|(i, p)| format!("[{}] {p}", i + 1)).collect();
+        let notes =
+            protocols.iter().enumerate().map(|(i, (_, p))| format!("[{}] {p}", i + 1)).collect();
         vec![Table {
             caption: format!("{what}; measured here, {}", self.spread()),
             notes,
@@ -240,7 +241,7 @@ impl Tables<'_> {
         let head_of = |path: &str| heads.iter().position(|(end, _)| last(path) == *end);
         let mut measures = self.measures(|path| head_of(path).is_some());
         let section = |m: &Measure| m.path.rsplit_once('.').map_or("", |p| p.0).to_owned();
-        measures.sort_by_key(|m| (section(m), m.protocol.clone(), head_of(&m.path)));
+        measures.sort_by_key(|m| (section(m), m.protocol_id.clone(), head_of(&m.path)));
         let column = |measure: Measure| {
             let head = heads[head_of(&measure.path)?].1;
             let context = match section(&measure).as_str() {
@@ -349,7 +350,8 @@ impl Tables<'_> {
         let mut notes = vec![format!(
             "Source: Table {} of the MTE-SLAM paper (Lu et al.), figures as printed there. \
              Protocol: {}.",
-            found.number, found.protocol
+            found.number,
+            found.protocol.sentence()
         )];
         let partial = self.plan.runs.iter().any(|r| r.partial);
         if partial {
@@ -369,7 +371,7 @@ impl Tables<'_> {
         }))
     }
 
-    /// What a protocol says, with the number of views as far as it is one.
+    /// What a protocol says; where runs say it with other numbers of views, without these.
     fn protocol(&self, measure: &Measure) -> String {
         let all: BTreeSet<&str> = self
             .results
@@ -379,7 +381,8 @@ impl Tables<'_> {
             .collect();
         match all.first() {
             Some(one) if all.len() == 1 => (*one).to_owned(),
-            _ => measure.protocol.clone(),
+            Some(one) => without_counts(one),
+            None => measure.protocol_id.clone(),
         }
     }
 
@@ -404,8 +407,8 @@ pub fn words(path: &str) -> String {
 mod tests {
     use super::*;
     use crate::{
-        report::results::Figure,
-        suite::{file::Suite, plan::DataRoot},
+        suite::{file::Suite, plan::DataRoot, program::tests::Pretend},
+        suite_report::results::Figure,
     };
 
     #[test]
@@ -421,12 +424,16 @@ mod tests {
         let text = "seeds = [1, 2]\npresets = ['fast']\nbenchmark = 'replica'\n\
                     scenes = [{ name = 'a', synthetic = { scene = 'room', frames = 4 } },\n\
                     { name = 'b', synthetic = { scene = 'office', frames = 4 } }]";
-        let suite = Suite::parse("s.toml", "s", text).unwrap();
+        let suite = Suite::parse("s.toml", "s", text, &Pretend).unwrap();
         let data = DataRoot::choose(None, &suite);
-        let plan = Plan::new(suite, std::path::Path::new("out"), &data).unwrap();
+        let plan = Plan::new(suite, std::path::Path::new("out"), &data, &Pretend).unwrap();
         let figure = |run: &RunResult| {
             let scene = if run.scene == "a" { 1.0 } else { 3.0 };
-            Figure { value: scene + 0.5 * f64::from(run.seed), protocol: "P in 8 views".to_owned() }
+            Figure {
+                value: scene + 0.5 * f64::from(run.seed),
+                protocol_id: "p@1".to_owned(),
+                protocol: "P in 8 views".to_owned(),
+            }
         };
         let runs = plan.runs.iter().map(|run| {
             let mut run = RunResult::new(run);
@@ -459,7 +466,7 @@ mod tests {
         let expected = ["fast", "base", "1.75 ± 0.35", "3.75 ± 0.35", "2.75 ± 0.35"];
         assert_eq!(tables[0].rows, [expected]);
         assert_eq!(tables[0].notes, ["Protocol: P in N views"]);
-        // A seed less of one scene is told, and is in no mean over scenes.
+        // A missing seed of one scene is marked, and is in no mean over scenes.
         let made = made_up(|run| {
             if run.scene == "b" && run.seed == 2 {
                 run.state = "missing";
@@ -487,7 +494,8 @@ mod tests {
     fn protocols_never_share_a_table_or_column() {
         let made = made_up(|run| {
             if run.scene == "b" {
-                run.figures.values_mut().for_each(|f| f.protocol = "Q".to_owned());
+                // The same words do not make figures comparable.
+                run.figures.values_mut().for_each(|f| f.protocol_id = "q@1".to_owned());
             }
         });
         let tables = scene_tables(&made);

@@ -2,14 +2,10 @@
 use super::{
     charts::{self, Bar, COLORS, Path, Series},
     document::{Block, Picture},
-    pictures,
+    embedded,
     results::{Results, RunResult},
 };
-use crate::{
-    evaluation,
-    output::{folder::replace_file, trajectory::read_tum},
-    suite::plan::Plan,
-};
+use crate::{evaluation, files::replace_file, suite::plan::Plan, trajectory::read_tum};
 use anyhow::{Context, Result, bail};
 use glam::DVec3;
 use mte_slam_metrics::PosePair;
@@ -23,7 +19,7 @@ const SHEET_WIDTH: u32 = 1400;
 /// Class maps likewise.
 const MAP_WIDTH: u32 = 520;
 
-/// Pictures of every scene that has a finished run; `say` hears what cannot be shown.
+/// Pictures of every scene that has a finished run; `say` receives what cannot be shown.
 pub fn blocks(plan: &Plan, results: &Results, say: &mut dyn FnMut(String)) -> Vec<Block> {
     let mut blocks = Vec::new();
     let suite = &plan.suite;
@@ -279,13 +275,13 @@ fn pictures_of(plan: &Plan, row: &Row, say: &mut dyn FnMut(String)) -> Vec<Pictu
         let name = format!("renders/{frame:06}.class_color.png");
         let path = run.folder.join(&name);
         if path.is_file() {
-            match pictures::small(&path, MAP_WIDTH) {
+            match embedded::small(&path, MAP_WIDTH) {
                 Ok(bytes) => shown.push(Picture {
                     caption: format!(
                         "{}: classes rendered at the estimated pose of frame {frame}, seed {}",
                         row.name, run.seed
                     ),
-                    html: pictures::img(&bytes, "class map"),
+                    html: embedded::img(&bytes, "class map"),
                     file: file_of(plan, run, &name),
                     wide: false,
                 }),
@@ -293,13 +289,13 @@ fn pictures_of(plan: &Plan, row: &Row, say: &mut dyn FnMut(String)) -> Vec<Pictu
             }
         }
         let name = format!("renders/{frame:06}.sheet.png");
-        match pictures::small(&run.folder.join(&name), SHEET_WIDTH) {
+        match embedded::small(&run.folder.join(&name), SHEET_WIDTH) {
             Ok(bytes) => shown.push(Picture {
                 caption: format!(
                     "{}: input, map and error at frame {frame}, seed {}",
                     row.name, run.seed
                 ),
-                html: pictures::img(&bytes, "comparison of input and map"),
+                html: embedded::img(&bytes, "comparison of input and map"),
                 file: file_of(plan, run, &name),
                 wide: true,
             }),
@@ -313,7 +309,7 @@ fn pictures_of(plan: &Plan, row: &Row, say: &mut dyn FnMut(String)) -> Vec<Pictu
                  (surfaces that face away left out) and from a frame's pose; seed {}",
                 row.name, run.seed
             ),
-            html: pictures::img(&bytes, "mesh coloured by its error"),
+            html: embedded::img(&bytes, "mesh coloured by its error"),
             file: Some(file),
             wide: true,
         }),
@@ -340,7 +336,7 @@ fn mesh_picture(plan: &Plan, row: &Row) -> Result<Option<(Vec<u8>, String)>> {
             fs::read(&path).with_context(|| format!("{name}: cannot be read"))?
         }
         _ => {
-            let bytes = pictures::mesh_error(run, pose, track.up)?;
+            let bytes = embedded::mesh_error(run, pose, track.up)?;
             replace_file(&path, &bytes)?;
             bytes
         }

@@ -1,7 +1,8 @@
-//! The figures of a run, by the core's metrics.
+//! The figures of a trajectory and of rendered views.
 use crate::{
     class_truth::ClassTruth,
-    output::metrics::{Metrics, RenderRecord, SemanticFigures},
+    metrics::{Metrics, RenderRecord, SemanticFigures},
+    protocol::Protocol,
 };
 use anyhow::{Context, Result};
 use mte_slam_core::slam::{PoseEstimate, View};
@@ -108,7 +109,7 @@ impl ViewScores {
         Ok((registration.registered(frame, camera), labels))
     }
 
-    /// Add a view of `frame`, whose classes are those of the truth's table, as are `labels`, the
+    /// Adds a view of `frame`, whose classes are those of the truth's table, as are `labels`, the
     /// true ones of the frame; both as [`ViewScores::registered`] gives them.
     pub fn add(&mut self, frame: &Frame, view: &View, labels: Option<&[u8]>) -> Result<()> {
         let place = || format!("scoring the view of frame {}", frame.index);
@@ -117,7 +118,7 @@ impl ViewScores {
         if let Some(labels) = labels {
             let width = self.info.camera.width as usize;
             self.classes.add(width, labels, &view.class).with_context(place)?;
-            // A frame without labels tells nothing about those that there are.
+            // A frame without labels says nothing about those of others.
             if let Some(input) = frame.labels.as_ref().filter(|_| self.truth.is_own()) {
                 let input = self.truth.of_map(input);
                 self.input_labels.add(width, labels, &input).with_context(place)?;
@@ -132,7 +133,7 @@ impl ViewScores {
         (&self.truth.table, self.classes.confusion())
     }
 
-    /// Put the figures, or why there are none, into `metrics`. `unlabelled_id` is that of the
+    /// Puts the figures, or why there are none, into `metrics`. `unlabelled_id` is that of the
     /// class pictures.
     pub fn report(&mut self, unlabelled_id: u16, metrics: &mut Metrics) {
         if self.frames.is_empty() {
@@ -149,6 +150,7 @@ impl ViewScores {
         metrics.color = self.color.report();
         let scale = self.registration.scale;
         if let (Some(color), false) = (&mut metrics.color, self.registration.is_identity()) {
+            color.protocol_id = Protocol::ColorViews { resampled: true }.id();
             color.protocol += &format!(
                 "; against the input resampled to the depth camera, as the map was trained \
                  (colour focal length {scale:.3} of the depth camera's, found from the images)"
@@ -166,10 +168,26 @@ impl ViewScores {
         }
         metrics.warnings.extend(self.truth.warnings());
         metrics.renders = Some(RenderRecord {
-            protocol: "at estimated poses, without depth input",
+            protocol: Protocol::Renders,
             frames: self.frames.clone(),
             unlabelled_id,
             classes_by: None,
         });
     }
+}
+
+/// Scores a view, whose classes become those of the truth's table. Returns the frame as the map was
+/// trained with it, and its true labels.
+///
+/// # Errors
+/// The true labels cannot be read, or an image has another size than the view.
+pub fn score_view(
+    scores: &mut ViewScores,
+    frame: &Frame,
+    view: &mut View,
+) -> Result<(Frame, Option<Vec<u8>>)> {
+    view.class = scores.truth().of_map(&view.class);
+    let (trained, labels) = scores.registered(frame)?;
+    scores.add(&trained, view, labels.as_deref())?;
+    Ok((trained.into_owned(), labels))
 }

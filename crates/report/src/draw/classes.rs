@@ -1,8 +1,6 @@
 //! What there is to see of the classes: `legend.png`, `confusion.png` and `classes.csv`.
-use super::{
-    metrics::SemanticFigures,
-    pictures::{Canvas, class_color},
-};
+use super::pictures::{Canvas, class_color};
+use crate::metrics::SemanticFigures;
 use anyhow::Result;
 use mte_slam_metrics::ConfusionMatrix;
 use mte_slam_types::classes::ClassTable;
@@ -143,7 +141,7 @@ fn cut(name: &str) -> String {
     name.chars().take(NAME - 2).chain("..".chars()).collect()
 }
 
-/// A line a class that occurs or is predicted; what is not known is empty. With `input`, the IoU
+/// One line per class that occurs or is predicted; what is not known is empty. With `input`, the IoU
 /// of the labels that the map learnt from.
 pub fn csv(figures: &SemanticFigures, input: Option<&SemanticFigures>) -> String {
     let mut text = String::from(

@@ -1,6 +1,6 @@
 //! The report as Markdown: its tables, and links to pictures in the runs' folders.
 use super::document::{Block, Document, Table};
-use crate::output::ablation::table as even_table;
+use crate::text_table::table as even_table;
 use std::fmt::Write;
 
 /// The text of `report.md`.

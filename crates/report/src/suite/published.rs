@@ -1,5 +1,6 @@
 //! What the paper's tables say, to be shown beside figures measured here.
 use super::file::Benchmark;
+use crate::protocol::Protocol;
 use anyhow::{Context, Result};
 use serde::Deserialize;
 
@@ -13,7 +14,7 @@ pub enum Kind {
     Reconstruction,
     /// mIoU by scene (Table IV).
     Semantics,
-    /// Seconds a frame (Table V).
+    /// Seconds per frame (Table V).
     Runtime,
     /// Modules on and off (Table VI).
     Ablation,
@@ -32,7 +33,7 @@ pub struct Published {
     /// What it is called.
     pub caption: String,
     /// What the paper says about how it was measured.
-    pub protocol: String,
+    pub protocol: Protocol,
     /// Columns after the method.
     pub columns: Vec<String>,
     /// Method and figures; a row may end early where the paper has dashes.

@@ -1,5 +1,8 @@
 //! A mesh against the true one, by the protocols of the field.
-use crate::{output::metrics::Metrics, screen::Screen};
+use crate::{
+    metrics::Metrics,
+    protocol::{Culling, Protocol},
+};
 use anyhow::{Context, Result, bail};
 use mte_slam_mesh::{CullProtocol, DepthRenderer, Keep, Mesh, Visibility};
 use mte_slam_metrics::{
@@ -26,7 +29,7 @@ pub struct MeshTruth {
 }
 
 impl MeshTruth {
-    /// Read a PLY file.
+    /// Reads a PLY file.
     pub fn read(path: &Path) -> Result<MeshTruth> {
         let name = path.display();
         let bytes =
@@ -106,16 +109,14 @@ pub struct ProtocolViews {
     pub seed: u32,
 }
 
-/// Put the figures of `ours` against the true mesh, or why there are none, into `metrics`.
+/// Puts the figures of `ours` against the true mesh, or why there are none, into `metrics`.
 pub fn score(
     ours: Mesh,
     truth: MeshTruth,
     sequence: &mut dyn Sequence,
     protocols: &MeshProtocols,
     metrics: &mut Metrics,
-    screen: Screen,
 ) -> Option<ProtocolViews> {
-    screen.note("comparing the mesh with the true one");
     match compare(ours, truth, sequence, protocols, metrics) {
         Ok(views) => Some(views),
         Err(reason) => {
@@ -155,7 +156,7 @@ fn compare(
         let [a, b] = sensor_visibility([&ours, &truth], sequence, protocol)?;
         let mut pair = [culled(&ours, &a), culled(&truth, &b)];
         let how = format!("{} in {n} views", protocol.name());
-        metrics.mesh = Some(surface(&mut pair, protocols, &how)?);
+        metrics.mesh = Some(surface(&mut pair, protocols, Culling::Eslam, &how)?);
     }
     if protocols.frustum {
         let protocol = CullProtocol::Frustum;
@@ -165,7 +166,7 @@ fn compare(
         };
         let mut pair = [culled(&ours, &seen(&ours)), culled(&truth, &seen(&truth))];
         let how = format!("{} in {n} views", protocol.name());
-        metrics.mesh_frustum = Some(surface(&mut pair, protocols, &how)?);
+        metrics.mesh_frustum = Some(surface(&mut pair, protocols, Culling::Frustum, &how)?);
     }
     let mut views = ProtocolViews {
         camera,
@@ -199,7 +200,7 @@ fn compare(
     let mut pair = [ours, culled(&truth, &seen(&truth))];
     let how = format!("{} in {n} real and {} virtual views", protocol.name(), virtual_poses.len());
     if protocols.coslam {
-        metrics.mesh_coslam = Some(surface(&mut pair, protocols, &how)?);
+        metrics.mesh_coslam = Some(surface(&mut pair, protocols, Culling::Coslam, &how)?);
     } else if protocols.icp {
         align(&mut pair, protocols.seed)?;
     }
@@ -249,7 +250,7 @@ fn sensor_visibility(
     Ok(seen)
 }
 
-/// Align the first mesh of a pair to the second.
+/// Aligns the first mesh of a pair to the second.
 fn align([ours, truth]: &mut [Mesh; 2], seed: u32) -> Result<()> {
     let aligned = mte_slam_metrics::icp(ours, truth, ICP_M, seed)?;
     ours.transform(&aligned);
@@ -260,13 +261,19 @@ fn alignment(icp: bool) -> &'static str {
     if icp { "after ICP (point to point, 0.1 m)" } else { "no alignment" }
 }
 
-fn surface(pair: &mut [Mesh; 2], protocols: &MeshProtocols, how: &str) -> Result<SurfaceReport> {
-    let seed = protocols.seed;
+fn surface(
+    pair: &mut [Mesh; 2],
+    protocols: &MeshProtocols,
+    culling: Culling,
+    how: &str,
+) -> Result<SurfaceReport> {
+    let MeshProtocols { seed, icp, .. } = *protocols;
     if protocols.icp {
         align(pair, seed)?;
     }
     let options = SurfaceOptions { seed, ..SurfaceOptions::default() };
     let mut report = evaluate_surface(&pair[0], &pair[1], &options)?;
+    report.protocol_id = Protocol::Surface { culling, icp }.id();
     report.protocol = format!("{}; {how}; {}", report.protocol, alignment(protocols.icp));
     Ok(report)
 }
@@ -279,6 +286,7 @@ fn depth(
     icp: bool,
 ) -> Result<MeshDepthReport> {
     let mut report = depth_l1(ours, truth, views)?;
+    report.protocol_id = Protocol::MeshDepth { views: report.wanted_views, icp }.id();
     report.protocol = format!("{}; {how}; {}", report.protocol, alignment(icp));
     Ok(report)
 }

@@ -1,6 +1,10 @@
 //! `ablation.json` and `ablation.md`: what each of the semantic modules brings, over seeds.
-use super::metrics::{EngineRecord, SemanticFigures, SequenceRecord};
-use mte_slam_core::{config::Head, settings::Choice, slam::ParameterCounts};
+use crate::{
+    metrics::{EngineRecord, SemanticFigures, SequenceRecord},
+    text_table::table,
+};
+use mte_slam_core::{config::Head, slam::ParameterCounts};
+use mte_slam_types::settings::Choice;
 use serde::{Deserialize, Serialize, Serializer};
 use std::{collections::BTreeMap, fmt::Write};
 
@@ -21,7 +25,7 @@ pub struct RunKey {
     pub layout: String,
     /// First frame taken.
     pub start: usize,
-    /// Every how many-th frame was taken.
+    /// Step between the frames taken.
     pub stride: usize,
     /// Frames taken.
     pub frames: usize,
@@ -37,7 +41,7 @@ pub struct RunKey {
     pub classes: Option<String>,
     /// Id asked to mean "no label".
     pub unlabelled: Option<u16>,
-    /// Every how many-th frame is scored.
+    /// Step between the frames scored.
     pub render_every: usize,
     /// `gpu` or `cpu`.
     pub engine: String,
@@ -97,7 +101,7 @@ pub struct FinishedRun {
     pub psnr_db: Option<f64>,
     /// Frames that could not be tracked.
     pub lost_frames: usize,
-    /// Mapping time an iteration, with what belongs to it \[s\]; `None` without iterations.
+    /// Mapping time per iteration, with what belongs to it \[s\]; `None` without iterations.
     pub mapping_iteration_s: Option<f64>,
     /// The last optimisation over all keyframes \[s\].
     pub finish_s: f64,
@@ -160,12 +164,13 @@ pub struct Variant {
     /// Feature redundancy suppressor.
     pub suppressor: bool,
     /// What makes classes of features.
-    #[serde(serialize_with = "head_name")]
+    #[serde(serialize_with = "choice_name")]
     pub head: Head,
 }
 
-fn head_name<S: Serializer>(head: &Head, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(head.names()[head.index()])
+/// Writes a choice under its name in a configuration.
+fn choice_name<S: Serializer>(choice: &impl Choice, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(choice.names().get(choice.index()).copied().unwrap_or_default())
 }
 
 /// One row of the table.
@@ -238,7 +243,7 @@ static FIGURES: [Figure; 9] = [
     figure("ate_rmse_cm", "ATE cm", 3, |r| r.ate_rmse_cm),
     Figure {
         factor: 1000.0,
-        ..figure("mapping_iteration_s", "ms an iteration", 1, |r| r.mapping_iteration_s)
+        ..figure("mapping_iteration_s", "ms per iteration", 1, |r| r.mapping_iteration_s)
     },
     figure("finish_s", "last optimisation s", 1, |r| Some(r.finish_s)),
 ];
@@ -308,7 +313,7 @@ pub struct Ablation {
     pub engine: EngineRecord,
     /// Seeds of every row.
     pub seeds: Vec<u32>,
-    /// Every how many-th frame was scored.
+    /// Step between the frames scored.
     pub render_every: usize,
     /// The labels that the map learnt from, against the truth; none where they are the truth.
     pub input_labels: Option<ClassScores>,
@@ -433,34 +438,6 @@ impl Ablation {
     }
 }
 
-/// A Markdown table with columns of even width, so that it reads as text, too.
-pub fn table(head: &[String], lines: &[Vec<String>]) -> String {
-    let all = || std::iter::once(head).chain(lines.iter().map(Vec::as_slice));
-    let width = |column: usize| all().map(|l| l[column].chars().count()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..head.len()).map(width).collect();
-    let mut text = String::new();
-    for (i, line) in all().enumerate() {
-        let cells: Vec<String> = line
-            .iter()
-            .zip(&widths)
-            .enumerate()
-            .map(
-                |(k, (cell, &w))| if k == 0 { format!("{cell:w$}") } else { format!("{cell:>w$}") },
-            )
-            .collect();
-        let _ = writeln!(text, "| {} |", cells.join(" | "));
-        if i == 0 {
-            let rules: Vec<String> = widths
-                .iter()
-                .enumerate()
-                .map(|(k, &w)| if k == 0 { "-".repeat(w) } else { "-".repeat(w - 1) + ":" })
-                .collect();
-            let _ = writeln!(text, "| {} |", rules.join(" | "));
-        }
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -475,12 +452,5 @@ mod tests {
         // A seed without the figure leaves none: means over other seeds would not compare.
         assert!(OverSeeds::of([Some(4.0), None].into_iter()).is_none());
         assert!(OverSeeds::of(std::iter::empty()).is_none());
-    }
-
-    #[test]
-    fn tables_are_markdown_with_even_columns() {
-        let lines = [vec!["both".to_owned(), "1.0 ± 0.2".to_owned()]];
-        let text = table(&["row".to_owned(), "mIoU".to_owned()], &lines);
-        assert_eq!(text, "| row  |      mIoU |\n| ---- | --------: |\n| both | 1.0 ± 0.2 |\n");
     }
 }

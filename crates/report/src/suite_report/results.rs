@@ -3,14 +3,14 @@
 //! Figures are taken from `metrics.json` as they are: each number below an object with a
 //! `protocol` is one, called by its path. What a later version measures comes along by itself.
 use crate::{
-    output::ablation::OverSeeds,
+    ablation::OverSeeds,
+    files::{RESUME_FOLDER, read_json},
     suite::{
         file::Benchmark,
-        plan::{Plan, Run, State, read_json},
-        process,
+        plan::{Plan, Run, STARTED, State},
     },
 };
-use anyhow::Result;
+use anyhow::{Context, Result};
 use serde::Serialize;
 use serde_json::Value;
 use std::{
@@ -37,8 +37,25 @@ const SETTINGS: [&str; 9] = [
 pub struct Figure {
     /// Its value, in the unit that its name ends with.
     pub value: f64,
-    /// How it was measured.
+    /// Id of the protocol it was measured by; figures compare only where it is equal.
+    pub protocol_id: String,
+    /// How it was measured, for people.
     pub protocol: String,
+}
+
+/// Why the figures of a file cannot be joined with others.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ResultsError {
+    /// A section says how it was measured in words alone.
+    #[error(
+        "{section}: found a protocol without `protocol_id`, expected both; the file is of a version \
+         before ids, so the run has to be made again"
+    )]
+    NoProtocolId {
+        /// Path of the object in `metrics.json`.
+        section: String,
+    },
 }
 
 /// One run, as far as it is.
@@ -118,7 +135,7 @@ pub struct Results {
 }
 
 impl Results {
-    /// Collect what is there. A file that cannot be read makes its run a failed one.
+    /// Collects what is there. A file that cannot be read makes its run a failed one.
     pub fn collect(plan: &Plan) -> Results {
         Results::of_runs(plan, plan.runs.iter().map(read_run).collect())
     }
@@ -135,7 +152,7 @@ impl Results {
             }
         }
         Results {
-            program: format!("mte-slam {}", env!("CARGO_PKG_VERSION")),
+            program: plan.program.clone(),
             suite: plan.suite.name.clone(),
             benchmark: plan.suite.benchmark,
             runs,
@@ -148,11 +165,11 @@ impl Results {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }
 
-    /// The text of `results.csv`: a line a figure.
+    /// The text of `results.csv`: one line per figure.
     pub fn to_csv(&self) -> String {
         let mut text = String::from(
             "run,scene,preset,ablation,seed,state,program,config_hash,engine,adapter,figure,value,\
-             protocol\n",
+             protocol,protocol_id\n",
         );
         for run in &self.runs {
             let engine = |key: &str| run.engine[key].as_str().unwrap_or_default().to_owned();
@@ -173,11 +190,12 @@ impl Results {
             .collect();
             let head = head.join(",");
             if run.figures.is_empty() {
-                let _ = writeln!(text, "{head},,,");
+                let _ = writeln!(text, "{head},,,,");
             }
             for (name, figure) in &run.figures {
-                let protocol = quoted(&figure.protocol);
-                let _ = writeln!(text, "{head},{},{},{protocol}", quoted(name), figure.value);
+                let (protocol, id) = (quoted(&figure.protocol), quoted(&figure.protocol_id));
+                let name = quoted(name);
+                let _ = writeln!(text, "{head},{name},{},{protocol},{id}", figure.value);
             }
         }
         text
@@ -257,8 +275,8 @@ impl RunResult {
 fn read_run(run: &Run) -> RunResult {
     let mut result = RunResult::new(run);
     // A report takes finished runs of another version as they are, and says so.
-    let finished = run.folder.join("metrics.json").is_file()
-        && !run.folder.join(crate::resume::FOLDER).exists();
+    let finished =
+        run.folder.join("metrics.json").is_file() && !run.folder.join(RESUME_FOLDER).exists();
     if !finished {
         (result.state, result.reason) = match run.state() {
             Ok(State::Interrupted) => ("interrupted", None),
@@ -285,7 +303,7 @@ fn fill(result: &mut RunResult, folder: &Path) -> Result<()> {
     result.config_hash = text(&json["configuration"]["hash"]);
     result.engine = json["engine"].clone();
     result.sequence = json["sequence"].clone();
-    result.started = read_json(&folder.join(process::STARTED)).unwrap_or_default();
+    result.started = read_json(&folder.join(STARTED)).unwrap_or_default();
     result.modules = modules(&folder.join("config.toml"));
     result.lost_frames = json["lost_frames"].as_array().map_or(0, Vec::len);
     let warnings = json["warnings"].as_array();
@@ -294,47 +312,71 @@ fn fill(result: &mut RunResult, folder: &Path) -> Result<()> {
         let reasons = absent.iter().filter_map(|(k, v)| Some((k.clone(), text(v)?)));
         result.absent = reasons.collect();
     }
-    walk(&json, "", None, &mut result.figures);
+    walk(&json, "", None, &mut result.figures)
+        .with_context(|| folder.join("metrics.json").display().to_string())?;
     complete_protocols(&json, &mut result.figures);
     Ok(())
 }
 
 /// A protocol is whole only with what other sections say: how views were rendered, and what the
-/// map's classes were learnt from.
+/// map's classes were learnt from. Ids are put together with `+`.
 fn complete_protocols(json: &Value, figures: &mut BTreeMap<String, Figure>) {
-    let views = json["renders"]["protocol"].as_str();
+    let of = |section: &str| {
+        let object = &json[section];
+        object["protocol_id"].as_str().zip(object["protocol"].as_str())
+    };
+    let (renders, novel) = (of("renders"), of("novel_views"));
     let sequence = &json["sequence"];
-    let learnt = if sequence["labels"] == sequence["truth_labels"] {
-        "learnt from the labels that are scored against"
+    let (learnt_id, learnt) = if sequence["labels"] == sequence["truth_labels"] {
+        ("labels/scored", "learnt from the labels that are scored against")
     } else {
-        "learnt from other labels than those that are scored against"
+        ("labels/other", "learnt from other labels than those that are scored against")
     };
     for (path, figure) in figures {
-        let section = path.split('.').next().unwrap_or_default();
-        if ["depth", "color", "semantics"].contains(&section)
-            && let Some(views) = views
-        {
+        let views = match path.split('.').next().unwrap_or_default() {
+            "depth" | "color" | "semantics" => renders,
+            // Those of the section itself say it already.
+            "novel_views" => novel.filter(|(id, _)| *id != figure.protocol_id),
+            _ => None,
+        };
+        if let Some((id, views)) = views {
             figure.protocol += &format!("; views {views}");
+            figure.protocol_id += &format!("+{id}");
         }
         if path.contains("semantics") {
             figure.protocol += &format!("; {learnt}");
+            figure.protocol_id += &format!("+{learnt_id}");
         }
     }
 }
 
 /// Every number below an object that names a protocol.
-fn walk(json: &Value, path: &str, protocol: Option<&str>, found: &mut BTreeMap<String, Figure>) {
-    let Some(object) = json.as_object() else { return };
-    let protocol = object.get("protocol").and_then(Value::as_str).or(protocol);
+fn walk(
+    json: &Value,
+    path: &str,
+    protocol: Option<(&str, &str)>,
+    found: &mut BTreeMap<String, Figure>,
+) -> Result<(), ResultsError> {
+    let Some(object) = json.as_object() else { return Ok(()) };
+    let text = |key: &str| object.get(key).and_then(Value::as_str);
+    let protocol = match (text("protocol_id"), text("protocol")) {
+        (Some(id), sentence) => Some((id, sentence.unwrap_or_default())),
+        (None, None) => protocol,
+        (None, Some(_)) => {
+            return Err(ResultsError::NoProtocolId { section: path.to_owned() });
+        }
+    };
     for (key, value) in object {
         let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
         match (value.as_f64(), protocol) {
-            (Some(value), Some(protocol)) if !SETTINGS.contains(&key.as_str()) => {
-                found.insert(path, Figure { value, protocol: protocol.to_owned() });
+            (Some(value), Some((id, sentence))) if !SETTINGS.contains(&key.as_str()) => {
+                let (protocol_id, protocol) = (id.to_owned(), sentence.to_owned());
+                found.insert(path, Figure { value, protocol_id, protocol });
             }
-            _ => walk(value, &path, protocol, found),
+            _ => walk(value, &path, protocol, found)?,
         }
     }
+    Ok(())
 }
 
 /// Whether fusion and suppressor were on; without labels neither ever is.
@@ -360,14 +402,23 @@ mod tests {
     #[test]
     fn figures_are_found_by_their_protocols() {
         let json = serde_json::json!({
-            "renders": { "protocol": "poses", "unlabelled_id": 3, "frames": [1, 2] },
-            "trajectory": { "protocol": "ATE", "aligned_cm": { "rmse": 0.5 }, "pairs": 7 },
-            "new": { "inner": { "protocol": "P2", "x_cm": 2, "none": null } },
+            "renders": {
+                "protocol": "poses", "protocol_id": "r@1", "unlabelled_id": 3, "frames": [1, 2]
+            },
+            "trajectory": {
+                "protocol": "ATE", "protocol_id": "a@1", "aligned_cm": { "rmse": 0.5 }, "pairs": 7
+            },
+            "new": { "inner": { "protocol": "P2", "protocol_id": "p@2", "x_cm": 2, "none": null } },
             "sequence": { "width": 3 },
-            "mesh": { "protocol": "M", "seed": 3, "sub": { "protocol": "N", "y_cm": 1.5 } },
+            "mesh": {
+                "protocol": "M",
+                "protocol_id": "m@1",
+                "seed": 3,
+                "sub": { "protocol": "N", "protocol_id": "n@1", "y_cm": 1.5 },
+            },
         });
         let mut found = BTreeMap::new();
-        walk(&json, "", None, &mut found);
+        walk(&json, "", None, &mut found).unwrap();
         let names: Vec<&str> = found.keys().map(String::as_str).collect();
         let expected =
             ["mesh.sub.y_cm", "new.inner.x_cm", "trajectory.aligned_cm.rmse", "trajectory.pairs"];
@@ -377,23 +428,43 @@ mod tests {
             (1.5, "N")
         );
         assert_eq!(found["new.inner.x_cm"].protocol, "P2");
+        assert_eq!(found["mesh.sub.y_cm"].protocol_id, "n@1");
+        assert_eq!(found["trajectory.aligned_cm.rmse"].protocol_id, "a@1");
+    }
+
+    #[test]
+    fn files_from_before_ids_are_refused() {
+        let json = serde_json::json!({ "mesh": { "depth": { "protocol": "M", "l1_cm": 1.0 } } });
+        let error = walk(&json, "", None, &mut BTreeMap::new()).unwrap_err();
+        assert_eq!(error, ResultsError::NoProtocolId { section: "mesh.depth".to_owned() });
+        let message = error.to_string();
+        assert!(message.contains("`protocol_id`") && message.contains("made again"), "{message}");
     }
 
     #[test]
     fn protocols_are_made_whole() {
         let json = serde_json::json!({
-            "renders": { "protocol": "at poses" },
+            "renders": { "protocol": "at poses", "protocol_id": "at@1" },
+            "novel_views": { "protocol": "elsewhere", "protocol_id": "new@1" },
             "sequence": { "labels": "noisy", "truth_labels": "dataset" },
         });
-        let figure = |p: &str| Figure { value: 0.0, protocol: p.to_owned() };
+        let figure = |p: &str| Figure {
+            value: 0.0,
+            protocol: p.to_owned(),
+            protocol_id: format!("{}@1", p.to_lowercase()),
+        };
         let mut figures = BTreeMap::new();
         figures.insert("semantics.miou_percent".to_owned(), figure("mIoU"));
         figures.insert("mesh.depth_cm".to_owned(), figure("M"));
+        figures.insert("novel_views.depth.l1_cm".to_owned(), figure("D"));
         complete_protocols(&json, &mut figures);
         assert_eq!(figures["mesh.depth_cm"].protocol, "M");
         let expected =
             "mIoU; views at poses; learnt from other labels than those that are scored against";
         assert_eq!(figures["semantics.miou_percent"].protocol, expected);
+        let id = |path: &str| figures[path].protocol_id.as_str();
+        assert_eq!(id("semantics.miou_percent"), "miou@1+at@1+labels/other");
+        assert_eq!((id("mesh.depth_cm"), id("novel_views.depth.l1_cm")), ("m@1", "d@1+new@1"));
     }
 
     #[test]

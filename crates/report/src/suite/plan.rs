@@ -1,11 +1,15 @@
 //! The runs of a suite: what each is made from, where it goes, and what is there already.
 use super::{
     file::{Scene, Suite},
-    options, run_file,
+    options,
+    program::{Program, RunOf},
+    run_file,
 };
-use crate::{configuration, errors::usage, output::folder::replace_file, resume, synthetic};
+use crate::{
+    files::{RESUME_FOLDER, read_json, replace_file},
+    usage,
+};
 use anyhow::{Context, Result, bail};
-use serde_json::Value as Json;
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -16,6 +20,8 @@ use toml::{Table, Value};
 pub const DATA_VARIABLE: &str = "MTE_SLAM_DATA";
 /// Why a run failed last time, in its folder.
 pub const FAILURE: &str = "failed.txt";
+/// How a run was started, in its folder.
+pub const STARTED: &str = "started.json";
 
 /// Where recordings are looked for.
 #[derive(Clone, Debug)]
@@ -49,7 +55,7 @@ impl DataRoot {
 pub enum State {
     /// All its files are there.
     Finished,
-    /// It left a checkpoint to go on from.
+    /// It left a checkpoint to resume from.
     Interrupted,
     /// There is nothing yet.
     Missing,
@@ -78,6 +84,8 @@ pub struct Run {
     pub config_hash: String,
     /// Whether its options ask for less than the whole recording.
     pub partial: bool,
+    /// Name and version of the program that makes it.
+    pub program: String,
     /// The text of its file.
     pub text: String,
 }
@@ -88,25 +96,27 @@ pub struct Plan {
     pub suite: Suite,
     /// The output folder.
     pub out: PathBuf,
+    /// Name and version of the program that makes the runs.
+    pub program: String,
     /// Runs, seed by seed, so that all scenes can be compared long before the last run.
     pub runs: Vec<Run>,
 }
 
 impl Plan {
-    /// Work out every run; what is wrong with any of them is an error here.
-    pub fn new(suite: Suite, out: &Path, data: &DataRoot) -> Result<Plan> {
+    /// Works out every run; what is wrong with any of them is an error here.
+    pub fn new(suite: Suite, out: &Path, data: &DataRoot, program: &dyn Program) -> Result<Plan> {
         let mut runs = Vec::new();
         for &seed in &suite.seeds {
             for scene in &suite.scenes {
                 for preset in &suite.presets {
                     for ablation in &suite.ablations {
                         let part = (preset.as_str(), ablation.name.as_str(), seed);
-                        runs.push(planned(&suite, out, data, scene, part, &ablation.set)?);
+                        runs.push(planned(&suite, out, data, program, scene, part, &ablation.set)?);
                     }
                 }
             }
         }
-        Ok(Plan { suite, out: out.to_owned(), runs })
+        Ok(Plan { suite, out: out.to_owned(), program: program.name(), runs })
     }
 
     /// All that is missing of the recordings is one error, with the way to get them.
@@ -161,14 +171,14 @@ impl Plan {
         Ok(())
     }
 
-    /// Write what every run needs: built-in recordings, and the files of the runs.
-    pub fn prepare(&self, say: &dyn Fn(&str)) -> Result<()> {
+    /// Writes what every run needs: built-in recordings, and the files of the runs.
+    pub fn prepare(&self, program: &dyn Program, note: &dyn Fn(&str)) -> Result<()> {
         for scene in &self.suite.scenes {
             let Some(synthetic) = scene.synthetic else { continue };
             let folder = self.out.join("data").join(synthetic.folder_name());
             if !folder.join("mesh.ply").is_file() {
-                say(&format!("writing the built-in recording {}", folder.display()));
-                synthetic::write(&folder, synthetic.options(), 0, |_| ())?;
+                note(&format!("writing the built-in recording {}", folder.display()));
+                program.write_recording(&folder, synthetic.options())?;
             }
         }
         for run in &self.runs {
@@ -186,6 +196,7 @@ fn planned(
     suite: &Suite,
     out: &Path,
     data: &DataRoot,
+    program: &dyn Program,
     scene: &Scene,
     (preset, ablation, seed): (&str, &str, u32),
     set: &[String],
@@ -221,16 +232,8 @@ fn planned(
         (None, None) => bail!("{}: scenes.{}: found no recording", suite.source, scene.name),
     };
     let place = format!("{}: {name}", suite.source);
-    let args = options::run_args(&dataset, &options, &place)?;
-    let effective = configuration::effective(&args.config, preset);
-    let config = match effective {
-        Ok(effective) => effective.config,
-        Err(error) => usage!("{place}: {error:#}"),
-    };
-    let selection = &args.selection;
-    let partial = selection.frames.is_some()
-        || (selection.stride, selection.start) != (1, 0)
-        || selection.scale != 1.0;
+    let RunOf { mesh, config_hash, partial } =
+        program.run_of(&dataset, &options, preset, &place)?;
     Ok(Run {
         name,
         scene: scene.name.clone(),
@@ -238,9 +241,10 @@ fn planned(
         ablation: ablation.to_owned(),
         seed,
         folder,
-        mesh: args.mesh.clone().unwrap_or_else(|| dataset.join("mesh.ply")),
-        config_hash: configuration::hash(&config)?,
+        mesh,
+        config_hash,
         partial,
+        program: program.name(),
         text: run_file::text(&written, &options)?,
     })
 }
@@ -252,7 +256,7 @@ impl Run {
         let folder = &self.folder;
         let metrics = folder.join("metrics.json");
         let file = folder.join(run_file::NAME);
-        let unfinished = folder.join(resume::FOLDER).exists();
+        let unfinished = folder.join(RESUME_FOLDER).exists();
         if metrics.is_file() || unfinished {
             let found = fs::read_to_string(&file).unwrap_or_default();
             if found != self.text {
@@ -277,11 +281,9 @@ impl Run {
 
     fn check_same_program(&self, metrics: &Path) -> Result<()> {
         let json = read_json(metrics)?;
-        let program = format!("mte-slam {}", env!("CARGO_PKG_VERSION"));
-        let hash = &self.config_hash;
         for (key, found, expected) in [
-            ("program", &json["program"], &program),
-            ("configuration.hash", &json["configuration"]["hash"], hash),
+            ("program", &json["program"], &self.program),
+            ("configuration.hash", &json["configuration"]["hash"], &self.config_hash),
         ] {
             if found.as_str() != Some(expected) {
                 bail!(
@@ -295,13 +297,6 @@ impl Run {
         }
         Ok(())
     }
-}
-
-/// A file of figures.
-pub fn read_json(path: &Path) -> Result<Json> {
-    let name = path.display();
-    let text = fs::read_to_string(path).with_context(|| format!("{name}: cannot be read"))?;
-    serde_json::from_str(&text).with_context(|| format!("{name}: found no JSON"))
 }
 
 fn first_difference(found: &str, expected: &str) -> (String, String, String) {

@@ -1,7 +1,7 @@
 //! Pictures of a report: files made small and put into the page, and meshes in the colours of their
 //! error.
 use super::{document::escape, results::RunResult};
-use crate::output::{colormap::turbo, pictures::Canvas};
+use crate::draw::{colormap::turbo, pictures::Canvas};
 use anyhow::{Context, Result, bail};
 use glam::{DMat3, DVec3};
 use image::{DynamicImage, ImageFormat, imageops::FilterType};
@@ -12,7 +12,7 @@ use std::{fs, io::Cursor, path::Path};
 
 /// Error at the top of the scale \[m\].
 const MOST_M: f64 = 0.05;
-/// Pictures of meshes are drawn so many times larger, then averaged.
+/// Factor by which pictures of meshes are drawn larger, then averaged.
 const OVERSAMPLING: u32 = 2;
 /// As the comparison sheets have it.
 const PAPER: [u8; 3] = [24, 26, 30];
@@ -183,7 +183,7 @@ fn shaded(mesh: &Mesh, error_m: &[f32], camera: &Camera, pose: &Pose) -> Vec<[u8
         let e: f64 = (0..3).map(|k| weights[k].clamp(0.0, 1.0) * of(k)).sum();
         let to_eye = (pose.translation - p).normalize_or_zero();
         let lit = 0.6 + 0.4 * (normal.dot(to_eye) / area.sqrt()).abs();
-        // The ends of the map are nearly black: its middle part tells more.
+        // The ends of the map are nearly black: its middle part shows more.
         turbo(0.06 + 0.88 * e / MOST_M).map(|c| f64::from(c) * lit)
     };
     let step = OVERSAMPLING as usize;

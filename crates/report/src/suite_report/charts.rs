@@ -1,6 +1,6 @@
 //! Charts as SVG, in the page's colours: classes `s0`, `s1`, ... for series, `axis`, `grid`, `truth`.
 use super::document::escape;
-use crate::output::plot::nice_step;
+use crate::draw::plot::nice_step;
 use glam::DVec3;
 use std::fmt::Write;
 
@@ -10,7 +10,7 @@ const LEFT: f64 = 58.0;
 const RIGHT: f64 = 12.0;
 const TOP: f64 = 30.0;
 const BOTTOM: f64 = 40.0;
-/// Points a line, at most: a pixel or two apart.
+/// Points per line, at most: a pixel or two apart.
 const POINTS: usize = 500;
 /// Letters of a bar's name, at most.
 const NAME: usize = 34;
@@ -246,7 +246,7 @@ fn ticks(most: f64, step: f64) -> impl Iterator<Item = f64> {
     (0..=(most / step).floor() as i64).map(move |i| i as f64 * step)
 }
 
-/// As many digits as tell a number from one that is `step` away.
+/// As many digits as distinguish a number from one that is `step` away.
 fn number(v: f64, step: f64) -> String {
     let digits = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
     format!("{v:.digits$}")

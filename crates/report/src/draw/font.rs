@@ -1,5 +1,5 @@
 //! An 8x8 bitmap font for captions in pictures: printable ASCII of the public-domain font of the
-//! IBM PC (Marcel Sondaar's and Daniel Hepper's `font8x8`). One byte a row, lowest bit leftmost.
+//! IBM PC (Marcel Sondaar's and Daniel Hepper's `font8x8`). One byte per row, lowest bit leftmost.
 
 /// Side of a glyph \[pixels\].
 pub const GLYPH: usize = 8;

@@ -1,11 +1,11 @@
-//! Trajectories in TUM format: one line a frame, `t x y z qx qy qz qw` of `world_from_camera`,
+//! Trajectories in TUM format: one line per frame, `t x y z qx qy qz qw` of `world_from_camera`,
 //! seconds and metres; what `evo` reads.
 use anyhow::{Context, Result, bail};
 use glam::{DQuat, DVec3};
 use mte_slam_types::pose::Pose;
 pub use mte_slam_types::trajectory_file::write_tum;
 
-/// Read such a file; `name` is for messages.
+/// Reads such a file; `name` is for messages.
 pub fn read_tum(name: &str, text: &str) -> Result<Vec<(f64, Pose)>> {
     let mut poses = Vec::new();
     for (i, line) in text.lines().enumerate() {

@@ -80,14 +80,14 @@ impl Canvas {
         Canvas { width, height, pixels: vec![fill; width * height] }
     }
 
-    /// Set one pixel.
+    /// Sets one pixel.
     pub fn set(&mut self, x: usize, y: usize, color: [u8; 3]) {
         if x < self.width && y < self.height {
             self.pixels[y * self.width + x] = color;
         }
     }
 
-    /// Fill a rectangle.
+    /// Fills a rectangle.
     pub fn fill(&mut self, x: usize, y: usize, w: usize, h: usize, color: [u8; 3]) {
         for v in y..(y + h).min(self.height) {
             for u in x..(x + w).min(self.width) {
@@ -96,14 +96,14 @@ impl Canvas {
         }
     }
 
-    /// Put an image of `w` pixels a row at (x, y), each pixel `zoom` pixels wide and high.
+    /// Puts an image of `w` pixels per row at (x, y), each pixel `zoom` pixels wide and high.
     pub fn image(&mut self, x: usize, y: usize, w: usize, zoom: usize, image: &[[u8; 3]]) {
         for (i, &color) in image.iter().enumerate() {
             self.fill(x + i % w * zoom, y + i / w * zoom, zoom, zoom, color);
         }
     }
 
-    /// Write text with its top left at (x, y), glyphs `zoom` times 8 pixels.
+    /// Writes text with its top left at (x, y), glyphs `zoom` times 8 pixels.
     pub fn text(&mut self, x: usize, y: usize, zoom: usize, color: [u8; 3], text: &str) {
         for (i, c) in text.chars().enumerate() {
             for (row, bits) in font::glyph(c).iter().enumerate() {
@@ -115,7 +115,7 @@ impl Canvas {
         }
     }
 
-    /// Write text upwards, its start at the bottom left (x, y); see [`Canvas::text`].
+    /// Writes text upwards, its start at the bottom left (x, y); see [`Canvas::text`].
     pub fn text_up(&mut self, x: usize, y: usize, zoom: usize, color: [u8; 3], text: &str) {
         for (i, c) in text.chars().enumerate() {
             for (row, bits) in font::glyph(c).iter().enumerate() {

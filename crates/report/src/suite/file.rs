@@ -1,6 +1,6 @@
 //! SUITE.toml: which scenes, seeds, presets and ablations are measured.
-use super::options;
-use crate::errors::usage;
+use super::program::Program;
+use crate::usage;
 use anyhow::Result;
 use mte_slam_synth::{SceneKind, SyntheticOptions};
 use serde::{Deserialize, Serialize};
@@ -129,7 +129,7 @@ impl Synthetic {
         }
     }
 
-    /// A folder's name that tells all of it.
+    /// A folder's name that states all of it.
     pub fn folder_name(&self) -> String {
         let scene = self.scene.name();
         let noise = if self.depth_noise { "-noise" } else { "" };
@@ -138,13 +138,13 @@ impl Synthetic {
 }
 
 impl Suite {
-    /// Read a file, or take the included suite of that name.
-    pub fn read(path: &Path) -> Result<Suite> {
+    /// Reads a file, or take the included suite of that name.
+    pub fn read(path: &Path, program: &dyn Program) -> Result<Suite> {
         let name = path.display().to_string();
         if !path.exists()
             && let Some((name, text)) = INCLUDED.iter().find(|(n, _)| path == Path::new(n))
         {
-            let suite = Suite::parse(&format!("the included suite {name}"), name, text)?;
+            let suite = Suite::parse(&format!("the included suite {name}"), name, text, program)?;
             return Ok(suite);
         }
         let text = match std::fs::read_to_string(path) {
@@ -155,14 +155,14 @@ impl Suite {
             ),
         };
         let stem = path.file_stem().map_or(String::new(), |s| s.to_string_lossy().into_owned());
-        let mut suite = Suite::parse(&name, &stem, &text)?;
+        let mut suite = Suite::parse(&name, &stem, &text, program)?;
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
         suite.folder = Some(folder.unwrap_or(Path::new(".")).to_owned());
         Ok(suite)
     }
 
     /// The suite of a text; `source` starts messages, `name` is its name where it says none.
-    pub fn parse(source: &str, name: &str, text: &str) -> Result<Suite> {
+    pub fn parse(source: &str, name: &str, text: &str, program: &dyn Program) -> Result<Suite> {
         let mut suite: Suite = match toml::from_str(text) {
             Ok(suite) => suite,
             Err(e) => usage!("{source}: not a suite: {}", e.to_string().trim_end()),
@@ -177,11 +177,11 @@ impl Suite {
         if suite.ablations.is_empty() {
             suite.ablations.push(Ablation { name: "base".to_owned(), set: Vec::new() });
         }
-        suite.check()?;
+        suite.check(program)?;
         Ok(suite)
     }
 
-    fn check(&self) -> Result<()> {
+    fn check(&self, program: &dyn Program) -> Result<()> {
         let source = &self.source;
         named(source, "name", &self.name)?;
         unique(source, "seeds", self.seeds.iter().map(u32::to_string))?;
@@ -200,11 +200,11 @@ impl Suite {
         for ablation in &self.ablations {
             named(source, "ablations.name", &ablation.name)?;
         }
-        self.check_options(&format!("{source}: options"), &self.options)?;
+        check_options(program, &format!("{source}: options"), &self.options)?;
         for scene in &self.scenes {
             named(source, "scenes.name", &scene.name)?;
             let place = format!("{source}: scenes.{}", scene.name);
-            self.check_options(&format!("{place}.options"), &scene.options)?;
+            check_options(program, &format!("{place}.options"), &scene.options)?;
             match (&scene.path, &scene.synthetic) {
                 (Some(_), None) => {}
                 (None, Some(s)) => {
@@ -229,16 +229,16 @@ impl Suite {
         }
         Ok(())
     }
+}
 
-    /// Keys of a table of options; values are checked where they are used.
-    fn check_options(&self, place: &str, options: &Table) -> Result<()> {
-        for key in ["seed", "preset"] {
-            if options.contains_key(key) {
-                usage!("{place}: found `{key}`, expected it in `{key}s` at the top of the suite");
-            }
+/// Keys of a table of options; values are checked where they are used.
+fn check_options(program: &dyn Program, place: &str, options: &Table) -> Result<()> {
+    for key in ["seed", "preset"] {
+        if options.contains_key(key) {
+            usage!("{place}: found `{key}`, expected it in `{key}s` at the top of the suite");
         }
-        options::arguments(options, place).map(|_| ())
     }
+    program.check_options(options, place)
 }
 
 /// A name that can be a part of a folder's.
@@ -269,13 +269,13 @@ fn unique(source: &str, key: &str, values: impl Iterator<Item = String>) -> Resu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::errors::UsageError;
+    use crate::{UsageError, suite::program::tests::Pretend};
 
     const GOOD: &str = "seeds = [1]\npresets = ['fast']\n[[scenes]]\nname = 'a'\n\
                         synthetic = { scene = 'room', frames = 4 }\n";
 
     fn message(text: &str) -> String {
-        let error = Suite::parse("s.toml", "s", text).unwrap_err();
+        let error = Suite::parse("s.toml", "s", text, &Pretend).unwrap_err();
         assert!(error.downcast_ref::<UsageError>().is_some());
         let message = error.to_string();
         assert!(message.starts_with("s.toml: "), "{message}");
@@ -285,20 +285,20 @@ mod tests {
     #[test]
     fn included_suites_are_valid() {
         for (name, _) in INCLUDED {
-            let suite = Suite::read(Path::new(name)).unwrap();
+            let suite = Suite::read(Path::new(name), &Pretend).unwrap();
             assert_eq!(suite.name, name);
             let needs_data = suite.scenes.iter().any(|s| s.path.is_some());
             assert_eq!(needs_data, !suite.download.is_empty(), "{name} says where its data is");
         }
-        let replica = Suite::read(Path::new("replica")).unwrap();
+        let replica = Suite::read(Path::new("replica"), &Pretend).unwrap();
         assert_eq!((replica.scenes.len(), replica.seeds.len()), (8, 5));
-        let scannet = Suite::read(Path::new("scannet")).unwrap();
+        let scannet = Suite::read(Path::new("scannet"), &Pretend).unwrap();
         assert_eq!(scannet.scenes.len(), 4);
     }
 
     #[test]
     fn defaults_are_filled_in() {
-        let suite = Suite::parse("s.toml", "s", GOOD).unwrap();
+        let suite = Suite::parse("s.toml", "s", GOOD, &Pretend).unwrap();
         assert_eq!((suite.name.as_str(), suite.ablations[0].name.as_str()), ("s", "base"));
         let synthetic = suite.scenes[0].synthetic.unwrap();
         assert_eq!(synthetic.folder_name(), "room-4frames-320px-seed0");
@@ -315,7 +315,7 @@ mod tests {
         let m = message(&GOOD.replace("'fast'", "'quick'"));
         assert!(m.contains("presets: found `quick`") && m.contains("replica"), "{m}");
         let m = message(&format!("{GOOD}options = {{ sacle = 0.5 }}"));
-        assert!(m.contains("scenes.a.options") && m.contains("Did you mean `scale`"), "{m}");
+        assert!(m.contains("scenes.a.options") && m.contains("`sacle`"), "{m}");
         assert!(message(&format!("{GOOD}options = {{ seed = 5 }}")).contains("`seeds`"));
         assert!(message(&format!("{GOOD}path = 'x'")).contains("expected one of them"));
         assert!(message(&GOOD.replace("'a'", "'a.b'")).contains("scenes.name: found `a.b`"));
