@@ -7,12 +7,12 @@
 extern crate alloc;
 
 pub mod config;
-pub mod device;
 pub mod engine;
 pub mod field;
 pub mod kernels;
 pub mod keyframe;
 pub mod layout;
+pub mod map;
 pub mod recording;
 pub mod shader;
 pub mod slam;

@@ -348,7 +348,7 @@ fn geometry_weights(o: &Options) -> Vec<Case> {
     ]
 }
 
-/// The five layers of the per-ray decoders, as [`mte_slam_core::device::Device`] runs them.
+/// The five layers of the per-ray decoders, as [`mte_slam_core::map::passes`] run them.
 pub fn weight_layers(rays: u32, classes: u32, chunk: u32, row: u32) -> Vec<WeightGradientParams> {
     let head = HEAD_FLOATS as u32 - GEOMETRY_FLOATS as u32;
     [

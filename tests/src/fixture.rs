@@ -5,7 +5,6 @@ use bytemuck::Zeroable;
 use glam::DVec3;
 use mte_slam_core::{
     config::FieldConfig,
-    device::pose_words,
     engine::{Engine, EngineError},
     field::{FieldShape, initial_decoders},
     kernels::{
@@ -13,6 +12,7 @@ use mte_slam_core::{
         shared::{FLAG_GUIDED, FLAG_MAP, FLAG_MASK, FLAG_POSE, RAY_WORDS},
     },
     layout::{BACKWARD_STRIP, FieldParams, RAY_OUT_FLOATS, RAY_STATE_FLOATS},
+    map::pose_words,
     recording::{Command, Recording, workgroups_1d},
 };
 use mte_slam_types::{

@@ -8,6 +8,7 @@ pub mod browser;
 pub mod cases;
 pub mod fixture;
 pub mod recorded;
+pub mod rig;
 pub mod samples;
 pub mod tokens;
 
@@ -271,3 +272,8 @@ impl TestRandom {
         low + (high - low) * (self.bits() >> 8) as f32 / (1 << 24) as f32
     }
 }
+
+/// The README's example must compile.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+pub struct Readme;

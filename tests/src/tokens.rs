@@ -442,7 +442,7 @@ fn extract_tokens() -> Vec<Case> {
             depths
                 .extend(image.chunks(2).map(|d| d[0] | d.get(1).map_or(0, |second| second << 16)));
         }
-        let poses = (0..slots).flat_map(|i| mte_slam_core::device::pose_words(&fixture::pose(i)));
+        let poses = (0..slots).flat_map(|i| mte_slam_core::map::pose_words(&fixture::pose(i)));
         let p = TokenParams {
             width,
             height,

@@ -2,17 +2,17 @@
 //! which threads or workgroups run. The same of iterations that train the fusion and move anchors.
 use mte_slam_core::{
     config::{Config, Head, LossConfig},
-    device::{Batch, Device, Guidance, Rates},
     engine::Engine,
     kernels::shared::{FLAG_GUIDED, FLAG_MAP, FLAG_POSE},
     layout::ANCHOR_FLOATS,
+    map::{Batch, Rates, SemanticSupervision},
     recording::Recording,
 };
 use mte_slam_tests::{
-    fixture::{self, CLASSES, DEPTH_UNIT_M, FRAMES, Options, State},
+    fixture::{self, CLASSES, FRAMES, Options, State},
     gpu_engine,
+    rig::Rig,
 };
-use pollster::block_on;
 
 const RAYS_PER_FRAME: u32 = 100;
 
@@ -34,8 +34,7 @@ fn map_with(engine: Engine, head: Head, iterations: u32) -> Vec<Vec<u32>> {
     config.mapping.decoder_stride = 2;
     config.keyframes.budget_mib = 1;
     let camera = fixture::camera();
-    let mut d =
-        Device::new(engine, &config, camera, DEPTH_UNIT_M, CLASSES, fixture::shape()).unwrap();
+    let mut d = Rig::new(engine, &config, camera, 0, fixture::shape());
     let mut r = Recording::new();
     // The map starts as free space, which trains no appearance in 20 iterations: start elsewhere.
     let state = State::new(&Options::default());
@@ -52,7 +51,7 @@ fn map_with(engine: Engine, head: Head, iterations: u32) -> Vec<Vec<u32>> {
         d.upload_pose(&mut r, slot, &fixture::pose(slot));
     }
     d.upload_window(&mut r, &[(2, true), (0, false), (1, false)]);
-    d.engine.submit(&r).unwrap();
+    d.submit(&r);
     let loss = LossConfig::default();
     for iteration in 0..iterations {
         let batch = Batch {
@@ -64,30 +63,31 @@ fn map_with(engine: Engine, head: Head, iterations: u32) -> Vec<Vec<u32>> {
             loss: &loss,
             iteration,
             first: 0,
+            camera: None,
             rare_share: 0.0,
-            guidance: Guidance::default(),
+            supervision: SemanticSupervision::default(),
         };
         let mut r = Recording::new();
         d.record_forward(&mut r, &batch);
         d.record_backward(&mut r, &batch);
-        d.record_pose_step(&mut r, &batch, 1e-3, 1e-3, iteration == 0);
+        d.record_pose_step(&mut r, &batch, [1e-3, 1e-3], iteration == 0);
         d.record_step(&mut r, &batch, Rates { planes: 5e-3, decoders: 1e-3 });
-        d.engine.submit(&r).unwrap();
+        d.submit(&r);
     }
-    assert_eq!(block_on(d.read_status()).unwrap(), 0, "saturated or not finite");
+    assert_eq!(d.read_status(), 0, "saturated or not finite");
     let mut out = Vec::new();
     let mut tensors = vec![d.geometry, d.appearance, d.semantic, d.decoders];
     tensors.extend(d.sample_head.as_ref().map(|h| h.parameters));
     for t in tensors {
         for buffer in [t.values, t.moment1, t.moment2] {
-            out.push(block_on(d.engine.read(buffer, 0, t.floats)).unwrap());
+            out.push(d.read_words(buffer, t.floats));
         }
     }
     for slot in 0..FRAMES {
-        let state = block_on(d.read_pose_state(slot)).unwrap();
+        let state = d.read_pose_state(slot);
         out.push(state.iter().map(|x| x.to_bits()).collect());
     }
-    let poses = block_on(d.read_poses(FRAMES)).unwrap();
+    let poses = d.read_poses(FRAMES);
     for (slot, pose) in poses.iter().enumerate() {
         let m = pose.expect("a finite pose").to_row_major();
         let moved =
@@ -158,8 +158,7 @@ fn fuse(engine: Engine) -> Vec<Vec<u32>> {
     (s.anchors, s.min_age, s.spawns, s.decay) = (24, 2, 6, 0.9);
     (s.spawn_distance, s.merge_distance, s.stable, s.min_importance) = (0.3, 0.25, 1.0, 1.5);
     let camera = fixture::wide_camera();
-    let mut d =
-        Device::new(engine, &config, camera, DEPTH_UNIT_M, CLASSES, fixture::shape()).unwrap();
+    let mut d = Rig::new(engine, &config, camera, 0, fixture::shape());
     let mut r = Recording::new();
     let state = State::new(&Options::default());
     for (tensor, name) in [
@@ -186,7 +185,7 @@ fn fuse(engine: Engine) -> Vec<Vec<u32>> {
         anchors.extend([2000.0, importance, 0.0, 9.0, 0.0, 0.0, 0.0].map(f32::to_bits));
     }
     r.upload(d.suppressor.as_ref().unwrap().anchors, 0, &anchors);
-    d.engine.submit(&r).unwrap();
+    d.submit(&r);
     let loss = LossConfig::default();
     for iteration in 0..8 {
         let batch = Batch {
@@ -198,8 +197,13 @@ fn fuse(engine: Engine) -> Vec<Vec<u32>> {
             loss: &loss,
             iteration,
             first: 0,
+            camera: None,
             rare_share: 0.0,
-            guidance: Guidance { compression: 0.05, feature: 0.1, ..Guidance::default() },
+            supervision: SemanticSupervision {
+                compression: 0.05,
+                feature: 0.1,
+                ..SemanticSupervision::default()
+            },
         };
         let mut r = Recording::new();
         d.record_fusion_step(&mut r, iteration % FRAMES, 1e-3);
@@ -209,25 +213,28 @@ fn fuse(engine: Engine) -> Vec<Vec<u32>> {
         d.record_anchor_maintenance(&mut r, &batch);
         d.record_backward(&mut r, &batch);
         d.record_step(&mut r, &batch, Rates { planes: 5e-3, decoders: 1e-3 });
-        d.engine.submit(&r).unwrap();
+        d.submit(&r);
     }
-    assert_eq!(block_on(d.read_status()).unwrap(), 0, "saturated or not finite");
+    assert_eq!(d.read_status(), 0, "saturated or not finite");
     let f = d.fusion.as_ref().unwrap();
-    let (parameters, tokens, floats) = (f.parameters, f.tokens, f.count() * f.stride as usize);
+    let parameters = f.parameters;
+    let (tokens, stride, count) = d.tokens();
     let s = d.suppressor.as_ref().unwrap();
     let (anchors, votes, slots) = (s.anchors, s.votes, s.slots() as usize);
     let mut out = Vec::new();
     for t in [d.semantic, d.decoders, parameters] {
         for buffer in [t.values, t.moment1, t.moment2] {
-            out.push(block_on(d.engine.read(buffer, 0, t.floats)).unwrap());
+            out.push(d.read_words(buffer, t.floats));
         }
     }
-    for (buffer, words) in
-        [(tokens, floats), (anchors, slots * ANCHOR_FLOATS), (votes, slots * CLASSES as usize)]
-    {
-        out.push(block_on(d.engine.read(buffer, 0, words)).unwrap());
+    for (buffer, words) in [
+        (tokens, count * stride),
+        (anchors, slots * ANCHOR_FLOATS),
+        (votes, slots * CLASSES as usize),
+    ] {
+        out.push(d.read_words(buffer, words));
     }
-    let counts = block_on(d.read_anchor_counts()).unwrap().unwrap();
+    let counts = d.read_anchor_counts().unwrap();
     println!("{counts:?}");
     // All that can happen to an anchor happens.
     assert!(counts.alive > 10 && counts.spawned > 10, "{counts:?}");

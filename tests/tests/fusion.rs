@@ -1,9 +1,8 @@
-//! Feature fusion and redundancy suppressor through the recordings of `Device`: analytic gradients
+//! Feature fusion and redundancy suppressor through the passes over a map: analytic gradients
 //! against central differences, where a patch of the image shows up, what the losses move, and
 //! settings that are refused.
 use mte_slam_core::{
     config::{Config, FusionConfig, LossConfig},
-    device::{Batch, ClassWeight, Device, Guidance, Rates},
     engine::Engine,
     kernels::{
         shared::{FLAG_ANCHORS, FLAG_DENSE, FLAG_GUIDED, FLAG_MAP},
@@ -12,15 +11,16 @@ use mte_slam_core::{
     layout::{
         ANCHOR_FLOATS, GEOMETRY_FLOATS, HEAD_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_ANCHOR,
     },
+    map::{Batch, ClassWeight, Rates, SemanticSupervision},
     recording::{BufferId, Recording},
 };
 use mte_slam_tests::{
     TestRandom, f32_words,
-    fixture::{self, CLASSES, DEPTH_UNIT_M, FRAMES, Options, State},
+    fixture::{self, CLASSES, FRAMES, Options, State},
     gpu_engine,
+    rig::Rig,
 };
 use mte_slam_types::frame::{FeatureMap, Frame};
-use pollster::block_on;
 use std::{collections::BTreeSet, ops::Range};
 
 const RAYS_PER_FRAME: u32 = 60;
@@ -38,19 +38,17 @@ fn config(fusion: FusionConfig) -> Config {
     c
 }
 
-/// A device with frames, random planes and decoders, and parameters of the fusion none of which is
+/// A map with frames, random planes and decoders, and parameters of the fusion none of which is
 /// 0: biases start there, and attention starts close to a mean.
-fn device(engine: Engine, fusion: FusionConfig) -> Device {
+fn device(engine: Engine, fusion: FusionConfig) -> Rig {
     device_with(engine, fusion, 0)
 }
 
 /// The same with feature maps of so many channels.
-fn device_with(engine: Engine, fusion: FusionConfig, channels: u32) -> Device {
+fn device_with(engine: Engine, fusion: FusionConfig, channels: u32) -> Rig {
     let camera = fixture::wide_camera();
     let (config, shape) = (config(fusion), fixture::shape());
-    let mut d =
-        Device::with_features(engine, &config, camera, DEPTH_UNIT_M, CLASSES, channels, shape)
-            .unwrap();
+    let mut d = Rig::new(engine, &config, camera, channels, shape);
     let mut r = Recording::new();
     let state = State::new(&Options::default());
     for (tensor, name) in [
@@ -70,11 +68,11 @@ fn device_with(engine: Engine, fusion: FusionConfig, channels: u32) -> Device {
     d.upload_window(&mut r, &WINDOW);
     let weights = [(1.0, 0.3), (0.5, -0.2), (2.0, 0.6), (1.5, 0.0), (0.75, -0.4)]
         .map(|(weight, adjustment)| ClassWeight { weight, adjustment });
-    d.upload_class_weights(&mut r, &weights, &[1.0, 0.5, 2.0, 1.5, 0.75], &[0.0; 5]);
-    d.engine.submit(&r).unwrap();
+    d.map.upload_class_weights(&mut r, &weights, &[1.0, 0.5, 2.0, 1.5, 0.75], &[0.0; 5]);
+    d.submit(&r);
     let f = d.fusion.as_ref().unwrap();
     let (tensor, layers) = (f.parameters, f.layers.clone());
-    let mut values = read(&mut d, tensor.values, tensor.floats);
+    let mut values = d.read(tensor.values, tensor.floats);
     let mut random = TestRandom(401);
     for layer in &layers {
         if layer.shape.bias != NO_BIAS {
@@ -88,7 +86,7 @@ fn device_with(engine: Engine, fusion: FusionConfig, channels: u32) -> Device {
             values[weights].iter_mut().for_each(|w| *w *= 2.0);
         }
     }
-    set(&mut d, tensor.values, &values);
+    d.write(tensor.values, &values);
     d
 }
 
@@ -100,24 +98,13 @@ fn feature_map(channels: usize, slot: u32) -> FeatureMap {
     FeatureMap { channels, height, width, values }
 }
 
-fn read(d: &mut Device, buffer: BufferId, floats: usize) -> Vec<f32> {
-    block_on(d.engine.read_as(buffer, 0, floats)).unwrap()
-}
-
-fn set(d: &mut Device, buffer: BufferId, values: &[f32]) {
-    let mut r = Recording::new();
-    r.upload(buffer, 0, values);
-    d.engine.submit(&r).unwrap();
-}
-
 /// Mean over the tokens of the loss at F.
-fn fusion_loss(d: &mut Device) -> f64 {
+fn fusion_loss(d: &mut Rig) -> f64 {
     let mut r = Recording::new();
     d.record_fusion_backward(&mut r, SLOT);
-    d.engine.submit(&r).unwrap();
-    let f = d.fusion.as_ref().unwrap();
-    let (tokens, stride, count) = (f.tokens, f.stride as usize, f.count());
-    let tokens = read(d, tokens, count * stride);
+    d.submit(&r);
+    let (tokens, stride, count) = d.tokens();
+    let tokens = d.read(tokens, count * stride);
     let column = tokens.iter().skip(COLOR_AT as usize + 3).step_by(stride);
     column.map(|x| f64::from(*x)).sum::<f64>() / count as f64
 }
@@ -125,14 +112,14 @@ fn fusion_loss(d: &mut Device) -> f64 {
 /// Compares a part of a tensor's gradient with differences of a loss: along the gradient, along
 /// random signs of it, and at single parameters.
 fn check(
-    d: &mut Device,
+    d: &mut Rig,
     buffer: BufferId,
     gradient: &[f32],
     part: Range<usize>,
     name: &str,
-    loss: &mut dyn FnMut(&mut Device) -> f64,
+    loss: &mut dyn FnMut(&mut Rig) -> f64,
 ) {
-    let values = read(d, buffer, gradient.len());
+    let values = d.read(buffer, gradient.len());
     let norm = part.clone().map(|i| gradient[i] * gradient[i]).sum::<f32>().sqrt();
     let largest = part.clone().map(|i| gradient[i].abs()).fold(0.0, f32::max);
     assert!(norm > 1e-4, "{name}: no gradient ({norm})");
@@ -146,7 +133,7 @@ fn check(
         let mut at = |h: f32| {
             let mut moved = values.clone();
             part.clone().for_each(|i| moved[i] += h * direction(i));
-            set(d, buffer, &moved);
+            d.write(buffer, &moved);
             loss(d)
         };
         (at(h) - at(-h)) / (2.0 * f64::from(h))
@@ -177,7 +164,7 @@ fn check(
             outliers.push((*i, expected, found));
         }
     }
-    set(d, buffer, &values);
+    d.write(buffer, &values);
     assert!(outliers.len() <= 1, "{name}: {outliers:?}");
 }
 
@@ -188,8 +175,8 @@ fn fusion_gradients(fusion: FusionConfig) {
     fusion_loss(&mut d);
     let f = d.fusion.as_ref().unwrap();
     let (tensor, layers) = (f.parameters, f.layers.clone());
-    assert_eq!((f.columns, f.rows), (13, 7));
-    let gradient = read(&mut d, tensor.gradient, tensor.floats);
+    assert_eq!((f.grid.columns, f.grid.rows), (13, 7));
+    let gradient = d.read(tensor.gradient, tensor.floats);
     for layer in layers {
         let weights = layer.shape.weights as usize
             ..(layer.shape.weights + layer.shape.weight_count()) as usize;
@@ -206,7 +193,7 @@ fn fusion_gradients(fusion: FusionConfig) {
         }
     }
     let decoders = d.decoders;
-    let gradient = read(&mut d, decoders.gradient, decoders.floats);
+    let gradient = d.read(decoders.gradient, decoders.floats);
     let bias = HEAD_FLOATS + CLASSES as usize * 16;
     for (name, part) in
         [("class head", HEAD_FLOATS..bias), ("class head, biases", bias..bias + CLASSES as usize)]
@@ -227,7 +214,7 @@ fn gradients_of_the_projection_of_feature_maps() {
     let f = d.fusion.as_ref().unwrap();
     let tensor = f.parameters;
     let layer = *f.layers.iter().find(|l| l.name == "feature projection").unwrap();
-    let gradient = read(&mut d, tensor.gradient, tensor.floats);
+    let gradient = d.read(tensor.gradient, tensor.floats);
     let weights =
         layer.shape.weights as usize..(layer.shape.weights + layer.shape.weight_count()) as usize;
     check(&mut d, tensor.values, &gradient, weights, layer.name, &mut fusion_loss);
@@ -247,16 +234,16 @@ fn feature_maps_take_the_place_of_labels() {
         let mut r = Recording::new();
         d.upload_frame(&mut r, SLOT, &frame);
         d.record_fusion_forward(&mut r, SLOT);
-        d.engine.submit(&r).unwrap();
+        d.submit(&r);
         let f = d.fusion.as_ref().unwrap();
-        let (tokens, stride, count) = (f.tokens, f.stride as usize, f.count());
         let layer = *f.layers.iter().find(|l| l.name == "feature projection").unwrap();
         let parameters = f.parameters;
-        let tokens = read(&mut d, tokens, count * stride);
+        let (tokens, stride, count) = d.tokens();
+        let tokens = d.read(tokens, count * stride);
         let at = SEMANTIC_AT as usize;
         let rows = tokens.chunks_exact(stride);
         let s: Vec<f32> = rows.flat_map(|row| row[at..at + 16].to_vec()).collect();
-        (s, read(&mut d, parameters.values, parameters.floats), layer)
+        (s, d.read(parameters.values, parameters.floats), layer)
     };
     let (s, w, layer) = semantic(false, false);
     assert!(semantic(true, false).0 == s, "labels are not read");
@@ -314,13 +301,14 @@ fn batch(compression: f64, feature: f64) -> Batch<'static> {
         loss: &NO_LOSS,
         iteration: 5,
         first: 0,
+        camera: None,
         rare_share: 0.0,
-        guidance: Guidance { compression, feature, ..Guidance::default() },
+        supervision: SemanticSupervision { compression, feature, ..SemanticSupervision::default() },
     }
 }
 
-/// A device with anchors (every fourth slot is free) and the fused features of all frames.
-fn supervised() -> Device {
+/// A map with anchors (every fourth slot is free) and the fused features of all frames.
+fn supervised() -> Rig {
     let mut d = device(Engine::cpu(), FusionConfig::default());
     let mut r = Recording::new();
     (0..FRAMES).for_each(|slot| d.record_fusion_forward(&mut r, slot));
@@ -332,56 +320,56 @@ fn supervised() -> Device {
         anchors.resize(anchors.len() + ANCHOR_FLOATS - 17, 0);
     }
     r.upload(d.suppressor.as_ref().unwrap().anchors, 0, &anchors);
-    d.engine.submit(&r).unwrap();
+    d.submit(&r);
     d
 }
 
 /// The weighted loss against anchors and fused features, mean over the rays.
-fn ray_loss(d: &mut Device, b: &Batch<'_>) -> f64 {
+fn ray_loss(d: &mut Rig, b: &Batch<'_>) -> f64 {
     let mut r = Recording::new();
     d.record_forward(&mut r, b);
-    d.engine.submit(&r).unwrap();
+    d.submit(&r);
     let rays = FRAMES * RAYS_PER_FRAME;
-    let state = block_on(d.read_ray_state(rays)).unwrap();
+    let state = d.read_ray_state(rays);
     let column = state.iter().skip(STATE_ANCHOR as usize * 4 + 3).step_by(RAY_STATE_FLOATS);
     column.map(|x| f64::from(*x)).sum::<f64>() / f64::from(rays)
 }
 
 /// Classes of the rays of a forward pass: the head's, and those of the nearest anchors.
-fn head_and_anchors(d: &mut Device, iteration: u32) -> Vec<(u32, u32)> {
+fn head_and_anchors(d: &mut Rig, iteration: u32) -> Vec<(u32, u32)> {
     let mut classes = Vec::new();
     for flags in [FLAG_GUIDED | FLAG_MAP, FLAG_GUIDED | FLAG_MAP | FLAG_ANCHORS] {
         let mut r = Recording::new();
         d.record_forward(&mut r, &Batch { flags, iteration, ..batch(0.0, 0.0) });
-        d.engine.submit(&r).unwrap();
-        let out = block_on(d.read_ray_out(FRAMES * RAYS_PER_FRAME)).unwrap();
+        d.submit(&r);
+        let out = d.read_ray_out(FRAMES * RAYS_PER_FRAME);
         classes.push(out.chunks_exact(RAY_OUT_FLOATS).map(|r| r[5].to_bits()).collect::<Vec<_>>());
     }
     classes[0].iter().copied().zip(classes[1].iter().copied()).collect()
 }
 
 /// Labels every pixel as the head does.
-fn label_as_the_head(d: &mut Device) {
+fn label_as_the_head(d: &mut Rig) {
     let pixels = fixture::wide_camera().pixels() as u32;
     for slot in 0..FRAMES {
         let mut labelled = Vec::new();
         while labelled.len() < pixels as usize {
             let first = labelled.len() as u32;
-            let rays_per_frame = d.max_rays().min(pixels - first);
+            let rays_per_frame = d.scratch.max_rays.min(pixels - first);
             let flags = FLAG_DENSE | FLAG_GUIDED;
             let mut r = Recording::new();
             d.upload_window(&mut r, &[(slot, true)]);
             let b = Batch { frames: 1, rays_per_frame, first, flags, ..batch(0.0, 0.0) };
             d.record_forward(&mut r, &b);
-            d.engine.submit(&r).unwrap();
-            let out = block_on(d.read_ray_out(rays_per_frame)).unwrap();
+            d.submit(&r);
+            let out = d.read_ray_out(rays_per_frame);
             let class = |ray: &[f32]| [128, 128, 128, ray[5].to_bits() as u8];
             labelled.extend(out.chunks_exact(RAY_OUT_FLOATS).map(class));
         }
         let mut r = Recording::new();
         d.upload_color(&mut r, slot, &labelled);
         d.upload_window(&mut r, &WINDOW);
-        d.engine.submit(&r).unwrap();
+        d.submit(&r);
     }
 }
 
@@ -390,8 +378,8 @@ fn label_as_the_head(d: &mut Device) {
 /// and nothing but anchors changes.
 #[test]
 fn anchors_settle_by_the_heads_classes() {
-    let untouched = |d: &mut Device| {
-        [d.semantic, d.decoders, d.appearance, d.geometry].map(|t| read(d, t.values, t.floats))
+    let untouched = |d: &mut Rig| {
+        [d.semantic, d.decoders, d.appearance, d.geometry].map(|t| d.read(t.values, t.floats))
     };
     let agreement = |classes: &[(u32, u32)]| {
         classes.iter().filter(|(head, anchor)| head == anchor).count() as f64 / classes.len() as f64
@@ -411,7 +399,7 @@ fn anchors_settle_by_the_heads_classes() {
             // With a rate that falls to 0, as at the end of a run.
             let rate = 0.3 * f64::from(60 - i) / 60.0;
             d.record_anchor_settling(&mut r, &b, rate, i == 0);
-            d.engine.submit(&r).unwrap();
+            d.submit(&r);
         }
         assert_eq!(kept, untouched(&mut d));
         (before, head_and_anchors(&mut d, 999))
@@ -440,17 +428,17 @@ fn gradients_of_anchors_and_fused_features() {
         d.record_forward(&mut r, &b);
         d.record_backward(&mut r, &b);
         d.record_step(&mut r, &b, Rates { planes: 0.0, decoders: 0.0 });
-        d.engine.submit(&r).unwrap();
-        assert_eq!(block_on(d.read_status()).unwrap(), 0, "saturated or not finite");
+        d.submit(&r);
+        assert_eq!(d.read_status(), 0, "saturated or not finite");
         let tensors = [d.geometry, d.appearance, d.semantic, d.decoders];
         let [geometry, appearance, semantic, decoders] = tensors.map(|t| -> Vec<f32> {
-            read(&mut d, t.moment1, t.floats).iter().map(|m| m * 10.0).collect()
+            d.read(t.moment1, t.floats).iter().map(|m| m * 10.0).collect()
         });
         assert!(geometry.iter().chain(&appearance).all(|g| *g == 0.0), "{name}");
         let s = GEOMETRY_FLOATS;
         assert!(decoders[..s + 1188].iter().chain(&decoders[HEAD_FLOATS..]).all(|g| *g == 0.0));
         let fine = d.shape.surface[1][3] as usize * 16;
-        let mut loss = |d: &mut Device| ray_loss(d, &b);
+        let mut loss = |d: &mut Rig| ray_loss(d, &b);
         for (part, range) in [("coarse planes", 0..fine), ("fine planes", fine..semantic.len())] {
             let name = format!("{name}: {part}");
             check(&mut d, tensors[2].values, &semantic, range, &name, &mut loss);
@@ -473,18 +461,16 @@ fn gradients_of_anchors_and_fused_features() {
 fn the_feature_loss_moves_the_planes() {
     let train = |b: &Batch<'_>| {
         let mut d = supervised();
-        let before =
-            [d.geometry, d.appearance, d.semantic].map(|t| read(&mut d, t.values, t.floats));
+        let before = [d.geometry, d.appearance, d.semantic].map(|t| d.read(t.values, t.floats));
         let start = ray_loss(&mut d, &batch(0.0, 1.0));
         for _ in 0..30 {
             let mut r = Recording::new();
             d.record_forward(&mut r, b);
             d.record_backward(&mut r, b);
             d.record_step(&mut r, b, Rates { planes: 5e-3, decoders: 0.0 });
-            d.engine.submit(&r).unwrap();
+            d.submit(&r);
         }
-        let after =
-            [d.geometry, d.appearance, d.semantic].map(|t| read(&mut d, t.values, t.floats));
+        let after = [d.geometry, d.appearance, d.semantic].map(|t| d.read(t.values, t.floats));
         let moved =
             [0, 1, 2].map(|k| before[k].iter().zip(&after[k]).filter(|(a, b)| a != b).count());
         (start, ray_loss(&mut d, &batch(0.0, 1.0)), moved, after[2].len())
@@ -499,14 +485,13 @@ fn the_feature_loss_moves_the_planes() {
 }
 
 /// The response of the appearance embedding at every token, in raster order.
-fn appearance(d: &mut Device, frame: &Frame) -> Vec<Vec<u32>> {
+fn appearance(d: &mut Rig, frame: &Frame) -> Vec<Vec<u32>> {
     let mut r = Recording::new();
     d.upload_frame(&mut r, SLOT, frame);
     d.record_fusion_forward(&mut r, SLOT);
-    d.engine.submit(&r).unwrap();
-    let f = d.fusion.as_ref().unwrap();
-    let (tokens, stride, count) = (f.tokens, f.stride as usize, f.count());
-    let rows = block_on(d.engine.read(tokens, 0, count * stride)).unwrap();
+    d.submit(&r);
+    let (tokens, stride, count) = d.tokens();
+    let rows = d.read_words(tokens, count * stride);
     let at = APPEARANCE_AT as usize;
     rows.chunks_exact(stride).map(|row| row[at..at + 16].to_vec()).collect()
 }
@@ -566,8 +551,7 @@ fn a_patch_moves_its_own_token() {
 fn an_image_smaller_than_a_token() {
     let camera = mte_slam_types::camera::Camera { width: 30, height: 7, ..fixture::camera() };
     let c = config(FusionConfig::default());
-    let mut d =
-        Device::new(Engine::cpu(), &c, camera, DEPTH_UNIT_M, CLASSES, fixture::shape()).unwrap();
+    let mut d = Rig::new(Engine::cpu(), &c, camera, 0, fixture::shape());
     assert!(d.fusion.is_none() && d.suppressor.is_some());
     let mut r = Recording::new();
     d.upload_frame(&mut r, 0, &fixture::frame_of(&camera, 0));
@@ -578,8 +562,8 @@ fn an_image_smaller_than_a_token() {
     d.record_forward(&mut r, &b);
     d.record_backward(&mut r, &b);
     d.record_step(&mut r, &b, Rates { planes: 5e-3, decoders: 1e-3 });
-    d.engine.submit(&r).unwrap();
-    assert_eq!(block_on(d.read_status()).unwrap(), 0);
+    d.submit(&r);
+    assert_eq!(d.read_status(), 0);
 }
 
 /// Each setting out of range is refused by name, with what was found and what is expected.

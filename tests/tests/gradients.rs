@@ -1,4 +1,4 @@
-//! Analytic gradients against central differences, through the recordings of `Device` (layers,
+//! Analytic gradients against central differences, through the passes over a map (layers,
 //! offsets and dispatch sizes included) and through single kernels.
 //!
 //! Hard cut-offs are off (no lightest interval, no smallest gradient) and the sharpness is low.
@@ -8,7 +8,6 @@
 use glam::DVec3;
 use mte_slam_core::{
     config::{Config, Head, LossConfig},
-    device::{Batch, Device, Guidance, Rates, Trained},
     engine::Engine,
     kernels::{
         align_points::ALIGN_POINTS,
@@ -16,6 +15,7 @@ use mte_slam_core::{
         shared::{FLAG_GUIDED, FLAG_MAP, FLAG_POSE},
     },
     layout::{GEOMETRY_FLOATS, HEAD_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS},
+    map::{Batch, ParameterTensor, Rates, SemanticSupervision},
     recording::Recording,
 };
 use mte_slam_tests::{
@@ -23,13 +23,13 @@ use mte_slam_tests::{
     cases::pixels,
     f32_words,
     fixture::{self, CLASSES, DEPTH_UNIT_M, FRAMES, Options, State, run_words, words},
+    rig::Rig,
 };
 use mte_slam_types::{
     camera::Camera,
     frame::{Bounds, Frame},
     pose::Pose,
 };
-use pollster::block_on;
 use std::ops::Range;
 
 const RAYS_PER_FRAME: u32 = 40;
@@ -67,7 +67,7 @@ fn config() -> Config {
 }
 
 struct Problem {
-    device: Device,
+    rig: Rig,
     loss: LossConfig,
     flags: u32,
     rays_per_frame: u32,
@@ -80,12 +80,11 @@ impl Problem {
 
     fn of(engine: Engine, loss: LossConfig, config: Config) -> Problem {
         let camera: Camera = fixture::camera();
-        let device =
-            Device::new(engine, &config, camera, DEPTH_UNIT_M, CLASSES, fixture::shape()).unwrap();
+        let rig = Rig::new(engine, &config, camera, 0, fixture::shape());
         let flags = FLAG_GUIDED | FLAG_MAP | FLAG_POSE;
-        let mut problem = Problem { device, loss, flags, rays_per_frame: RAYS_PER_FRAME };
+        let mut problem = Problem { rig, loss, flags, rays_per_frame: RAYS_PER_FRAME };
         let state = State::new(&Options::default());
-        let d = &mut problem.device;
+        let d = &mut problem.rig;
         let mut r = Recording::new();
         for (tensor, name) in [
             (d.geometry, "planes_geometry"),
@@ -100,7 +99,7 @@ impl Problem {
             d.upload_pose(&mut r, slot, &fixture::pose(slot));
         }
         d.upload_window(&mut r, &[(2, false), (0, false), (1, false)]);
-        d.engine.submit(&r).unwrap();
+        d.submit(&r);
         problem
     }
 
@@ -114,8 +113,9 @@ impl Problem {
             loss,
             iteration: 5,
             first: 0,
+            camera: None,
             rare_share: 0.0,
-            guidance: Guidance::default(),
+            supervision: SemanticSupervision::default(),
         }
     }
 
@@ -124,22 +124,22 @@ impl Problem {
         let loss = self.loss.clone();
         let batch = self.batch(&loss);
         let mut r = Recording::new();
-        self.device.record_forward(&mut r, &batch);
-        self.device.record_backward(&mut r, &batch);
-        self.device.engine.submit(&r).unwrap();
+        self.rig.record_forward(&mut r, &batch);
+        self.rig.record_backward(&mut r, &batch);
+        self.rig.submit(&r);
         let rays = FRAMES * self.rays_per_frame;
-        let out = block_on(self.device.read_ray_out(rays)).unwrap();
+        let out = self.rig.read_ray_out(rays);
         total_loss(&out, &loss)
     }
 
     fn read(&mut self, buffer: mte_slam_core::recording::BufferId, floats: usize) -> Vec<f32> {
-        block_on(self.device.engine.read_as(buffer, 0, floats)).unwrap()
+        self.rig.read(buffer, floats)
     }
 
-    fn set(&mut self, tensor: Trained, values: &[f32]) {
+    fn set(&mut self, tensor: ParameterTensor, values: &[f32]) {
         let mut r = Recording::new();
         r.upload(tensor.values, 0, values);
-        self.device.engine.submit(&r).unwrap();
+        self.rig.submit(&r);
     }
 
     /// One step with rate 0: Adam's first moments are a tenth of the gradients afterwards.
@@ -147,13 +147,13 @@ impl Problem {
         let loss = self.loss.clone();
         let batch = self.batch(&loss);
         let mut r = Recording::new();
-        self.device.record_forward(&mut r, &batch);
-        self.device.record_backward(&mut r, &batch);
-        self.device.record_pose_step(&mut r, &batch, 0.0, 0.0, true);
-        self.device.record_step(&mut r, &batch, Rates { planes: 0.0, decoders: 0.0 });
-        self.device.engine.submit(&r).unwrap();
-        assert_eq!(block_on(self.device.read_status()).unwrap(), 0, "saturated or not finite");
-        let d = &self.device;
+        self.rig.record_forward(&mut r, &batch);
+        self.rig.record_backward(&mut r, &batch);
+        self.rig.record_pose_step(&mut r, &batch, [0.0, 0.0], true);
+        self.rig.record_step(&mut r, &batch, Rates { planes: 0.0, decoders: 0.0 });
+        self.rig.submit(&r);
+        assert_eq!(self.rig.read_status(), 0, "saturated or not finite");
+        let d = &self.rig;
         [d.geometry, d.appearance, d.semantic, d.decoders].map(|t| {
             let moments = self.read(t.moment1, t.floats);
             moments.iter().map(|m| m * 10.0).collect()
@@ -187,7 +187,13 @@ fn losses() -> LossConfig {
 
 /// Compares a part of a tensor's gradient with differences of the loss: single parameters with
 /// the largest gradients, and directions.
-fn check(problem: &mut Problem, tensor: Trained, gradient: &[f32], part: Range<usize>, name: &str) {
+fn check(
+    problem: &mut Problem,
+    tensor: ParameterTensor,
+    gradient: &[f32],
+    part: Range<usize>,
+    name: &str,
+) {
     let values = problem.read(tensor.values, tensor.floats);
     let largest = part.clone().map(|i| gradient[i].abs()).fold(0.0, f32::max);
     assert!(largest > 1e-5, "{name}: no gradient ({largest})");
@@ -240,7 +246,7 @@ fn geometry_planes_and_decoder() {
     // The gradient of the classes stops at the interval weights by design.
     let mut problem = Problem::new(Engine::cpu(), LossConfig { semantic: 0.0, ..losses() });
     let [geometry, _, _, decoders] = problem.gradients();
-    let d = &problem.device;
+    let d = &problem.rig;
     let (planes, weights) = (d.geometry, d.decoders);
     let fine = d.shape.geometry[1][3] as usize * 16;
     check(&mut problem, planes, &geometry, 0..fine, "coarse geometry planes");
@@ -261,8 +267,8 @@ fn geometry_planes_and_decoder() {
 fn appearance_and_colour_decoder() {
     let mut problem = Problem::new(Engine::cpu(), losses());
     let [_, appearance, _, decoders] = problem.gradients();
-    let (planes, weights) = (problem.device.appearance, problem.device.decoders);
-    let fine = problem.device.shape.surface[1][3] as usize * 16;
+    let (planes, weights) = (problem.rig.appearance, problem.rig.decoders);
+    let fine = problem.rig.shape.surface[1][3] as usize * 16;
     check(&mut problem, planes, &appearance, 0..fine, "coarse appearance planes");
     check(&mut problem, planes, &appearance, fine..appearance.len(), "fine appearance planes");
     let s = GEOMETRY_FLOATS;
@@ -280,8 +286,8 @@ fn appearance_and_colour_decoder() {
 fn semantic_planes_decoder_and_head() {
     let mut problem = Problem::new(Engine::cpu(), losses());
     let [_, _, semantic, decoders] = problem.gradients();
-    let (planes, weights) = (problem.device.semantic, problem.device.decoders);
-    let fine = problem.device.shape.surface[1][3] as usize * 16;
+    let (planes, weights) = (problem.rig.semantic, problem.rig.decoders);
+    let fine = problem.rig.shape.surface[1][3] as usize * 16;
     check(&mut problem, planes, &semantic, 0..fine, "coarse semantic planes");
     check(&mut problem, planes, &semantic, fine..semantic.len(), "fine semantic planes");
     let (s, head) = (GEOMETRY_FLOATS, HEAD_FLOATS);
@@ -306,7 +312,7 @@ fn per_sample_head_and_semantic_planes() {
     let mut problem = Problem::of(Engine::cpu(), losses(), config);
     // A hundred times the work of a head that runs once a ray: fewer rays.
     problem.rays_per_frame = 16;
-    let d = &problem.device;
+    let d = &problem.rig;
     assert!(d.fusion.is_none() && d.suppressor.is_none());
     let head = d.sample_head.as_ref().unwrap();
     let (t, layers) = (head.parameters, head.layers);
@@ -323,8 +329,8 @@ fn per_sample_head_and_semantic_planes() {
         let biases = gradient[layer.bias() as usize..part.end].iter();
         assert!(biases.filter(|g| **g != 0.0).count() * 8 > layer.outputs as usize);
     }
-    let planes = problem.device.semantic;
-    let fine = problem.device.shape.surface[1][3] as usize * 16;
+    let planes = problem.rig.semantic;
+    let fine = problem.rig.shape.surface[1][3] as usize * 16;
     check(&mut problem, planes, &semantic, 0..fine, "coarse semantic planes");
     check(&mut problem, planes, &semantic, fine..semantic.len(), "fine semantic planes");
     // The ray's decoders of classes rest; geometry gets what it gets without classes.
@@ -352,7 +358,7 @@ fn semantic_gradients_stop_at_the_weights() {
     assert!(geometry.iter().chain(&appearance).all(|g| *g == 0.0));
     assert!(decoders[..GEOMETRY_FLOATS + 1188].iter().all(|g| *g == 0.0));
     assert!(semantic.iter().any(|g| *g != 0.0));
-    let state = block_on(problem.device.read_pose_state(0)).unwrap();
+    let state = problem.rig.read_pose_state(0);
     assert!(state[26..32].iter().all(|g| *g == 0.0), "{state:?}");
 }
 
@@ -370,7 +376,7 @@ fn poses_of_the_window() {
         let mut problem = Problem::new(Engine::cpu(), loss);
         problem.gradients();
         for slot in 0..FRAMES {
-            let state = block_on(problem.device.read_pose_state(slot)).unwrap();
+            let state = problem.rig.read_pose_state(slot);
             let gradient: Vec<f64> = state[26..32].iter().map(|g| f64::from(*g)).collect();
             let norm = gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
             assert!(norm > 1e-3, "{name}: no gradient at frame {slot}");
@@ -396,8 +402,8 @@ fn poses_of_the_window() {
 
 fn place(problem: &mut Problem, slot: u32, pose: &Pose) {
     let mut r = Recording::new();
-    problem.device.upload_pose(&mut r, slot, pose);
-    problem.device.engine.submit(&r).unwrap();
+    problem.rig.upload_pose(&mut r, slot, pose);
+    problem.rig.submit(&r);
 }
 
 /// Rays without depth and rays that leave the map, with the samples held where they are: geometry
@@ -458,7 +464,7 @@ fn rays_without_depth_teach_colour() {
             let mut twist = [0.0; 6];
             twist[k] = h;
             let mut moved = fixed.clone();
-            let pose = mte_slam_core::device::pose_words(&fixture::pose(0).retract(&twist));
+            let pose = mte_slam_core::map::pose_words(&fixture::pose(0).retract(&twist));
             moved.buffers.get_mut("poses").unwrap()[..12].copy_from_slice(&f32_words(pose));
             moved.run(&mut Engine::cpu(), &SAMPLE_RAYS);
             total(&mut moved)
@@ -488,7 +494,7 @@ fn alignment_to_the_field() {
         let mut p = state.params;
         [p.inv_sigma_distance, p.inv_sigma_intensity] =
             if kind == 0 { [inverse[0], 0.0] } else { [0.0, inverse[1]] };
-        let mut poses = f32_words(mte_slam_core::device::pose_words(pose));
+        let mut poses = f32_words(mte_slam_core::map::pose_words(pose));
         poses.resize(36, 0);
         state.buffers.insert("poses", poses);
         state.buffers.insert("pixels", f32_words(*pixel));

@@ -1,7 +1,6 @@
 //! Mistakes known from other systems of this kind, on both engines.
 use mte_slam_core::{
     config::{Config, LossConfig},
-    device::{Batch, Device, Guidance},
     engine::Engine,
     kernels::{
         adam::{ADAM, AdamParams},
@@ -10,14 +9,15 @@ use mte_slam_core::{
         shared::{FLAG_DENSE, FLAG_GUIDED, FLAG_MAP, FLAG_MASK, FLAG_POSE, Grid, plane_corners},
     },
     layout::{CHANNELS, RAY_STATE_FLOATS, STATE_DEPTH},
+    map::{Batch, SemanticSupervision},
     recording::Recording,
 };
 use mte_slam_tests::{
     f32_words,
-    fixture::{self, CLASSES, DEPTH_UNIT_M, Options, State, run_words, words},
+    fixture::{self, Options, State, run_words, words},
     gpu_engine,
+    rig::Rig,
 };
-use pollster::block_on;
 
 fn engines() -> Vec<Engine> {
     let mut engines = vec![Engine::cpu()];
@@ -212,7 +212,7 @@ fn a_reused_slot_forgets_the_pose_steps_of_its_former_frame() {
     let loss = LossConfig::default();
     let last_step = |engine: Engine, former: Option<u32>| {
         let (camera, shape) = (fixture::camera(), fixture::shape());
-        let d = &mut Device::new(engine, &config, camera, DEPTH_UNIT_M, CLASSES, shape).unwrap();
+        let d = &mut Rig::new(engine, &config, camera, 0, shape);
         let mut r = Recording::new();
         let state = State::new(&Options::default());
         r.upload(d.geometry.values, 0, &state.buffers["planes_geometry"]);
@@ -229,12 +229,13 @@ fn a_reused_slot_forgets_the_pose_steps_of_its_former_frame() {
                 loss: &loss,
                 iteration,
                 first: 0,
+                camera: None,
                 rare_share: 0.0,
-                guidance: Guidance::default(),
+                supervision: SemanticSupervision::default(),
             };
             d.record_forward(r, &batch);
             d.record_backward(r, &batch);
-            d.record_pose_step(r, &batch, 1e-3, 1e-3, false);
+            d.record_pose_step(r, &batch, [1e-3, 1e-3], false);
         };
         if let Some(former) = former {
             d.upload_frame(&mut r, SLOT, &fixture::frame(former));
@@ -244,9 +245,9 @@ fn a_reused_slot_forgets_the_pose_steps_of_its_former_frame() {
         d.upload_frame(&mut r, SLOT, &fixture::frame(0));
         d.upload_pose(&mut r, SLOT, &fixture::pose(0));
         step(&mut r, 5);
-        d.engine.submit(&r).unwrap();
-        let state = block_on(d.read_pose_state(SLOT)).unwrap();
-        let pose = block_on(d.read_poses(SLOT + 1)).unwrap()[SLOT as usize].unwrap();
+        d.submit(&r);
+        let state = d.read_pose_state(SLOT);
+        let pose = d.read_poses(SLOT + 1)[SLOT as usize].unwrap();
         let moved = (pose.translation - fixture::pose(0).translation).length();
         assert!(moved > 5e-4, "the pose moved by {moved} m");
         (state, pose)

@@ -8,9 +8,9 @@ use crate::{
     camera::Camera,
     classes::ClassTable,
     config::Config,
-    device::{AnchorCounts, Counters},
     frame::{Bounds, MAX_FEATURE_CHANNELS, SequenceInfo},
     hash::Hasher,
+    map::{AnchorCounts, Counters},
     pose::Pose,
     track::odometry::{ColourRegistration, OdometerState},
 };
@@ -199,14 +199,14 @@ impl Slam {
             return Err(wrong("state", "a map that was restored to be shown", "a run"));
         }
         let used_slots = self.used_slots;
-        let device = self.device()?;
+        let (engine, map, _) = self.mapped()?;
         let mut tensors = Vec::new();
-        for b in device.state_buffers(used_slots) {
-            let words = device.engine.read(b.buffer, 0, b.words()).await?;
+        for b in map.state_buffers(used_slots) {
+            let words = engine.read(b.buffer, 0, b.words()).await?;
             let dtype = if b.floats { Dtype::F32 } else { Dtype::U32 };
             tensors.push(tensor(&b.name, dtype, b.shape.to_vec(), &words));
         }
-        let (bounds, counters, slots) = (device.shape.bounds, device.counters(), device.slots);
+        let (bounds, counters, slots) = (map.shape.bounds, map.counters(), map.slots());
 
         let n = self.frames.len();
         let poses: Vec<[f64; 16]> =
@@ -288,7 +288,7 @@ impl Checkpoint {
         Ok(bytemuck::pod_collect_to_vec(&found.bytes))
     }
 
-    /// Everything but the device's buffers, checked.
+    /// Everything but the map's buffers, checked.
     pub(super) fn saved(&self) -> Result<Saved, SlamError> {
         let entry =
             |key: &str| self.metadata.get(key).ok_or_else(|| wrong(key, "nothing", "an entry"));

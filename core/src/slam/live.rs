@@ -4,7 +4,9 @@ use super::{Observation, PoseEstimate, Slam, SlamError, mapping::observation_ste
 use crate::{
     camera::Camera,
     classes::UNLABELLED,
+    engine::Engine,
     frame::Bounds,
+    map::{Map, Scratch, passes},
     mesh::{self, Block, BlockMesher, CullProtocol, Keep, Mesh, Visibility},
 };
 use alloc::{
@@ -105,8 +107,8 @@ impl Slam {
         }
         live.seen = self.observations.len();
 
-        let device = self.device()?;
-        let held = device.shape.bounds;
+        let (engine, map, scratch) = self.mapped()?;
+        let held = map.shape.bounds;
         let mut taken = Vec::new();
         while taken.len() < limit
             && let Some(key) = live.dirty.pop_first()
@@ -125,7 +127,7 @@ impl Slam {
         // One read-back for all chunks' probes, one for all distances, one for all surfaces: on
         // the web each costs some milliseconds of waiting whatever its size.
         let probes: Vec<Block> = taken.iter().map(|(_, _, block)| block.probe(4)).collect();
-        let distances = distances(device, &probes, held, truncation_m).await?;
+        let distances = distances(engine, map, scratch, &probes, held, truncation_m).await?;
         let mut holds = probes.iter().zip(&distances);
         let (mut full, mut chunks) = (Vec::new(), Vec::new());
         for (key, mesher, block) in taken {
@@ -136,7 +138,7 @@ impl Slam {
             }
         }
         let blocks: Vec<Block> = full.iter().map(|(_, _, block)| block.clone()).collect();
-        let distances = self::distances(device, &blocks, held, truncation_m).await?;
+        let distances = self::distances(engine, map, scratch, &blocks, held, truncation_m).await?;
         for ((key, mut mesher, block), d) in full.into_iter().zip(&distances) {
             mesher.add_block(&block, d)?;
             chunks.push(MeshChunk { key, mesh: mesher.finish() });
@@ -157,9 +159,9 @@ impl Slam {
             points.extend(chunk.mesh.positions.iter().map(|p| [p[0], p[1], p[2], 0.0]));
         }
         let by_anchors = self.classes_by_anchors();
-        let device = self.device()?;
-        let classes = device.classes > 0;
-        let values = device.query_surface(&points, by_anchors).await?;
+        let (engine, map, scratch) = self.mapped()?;
+        let classes = map.classes > 0;
+        let values = passes::query_surface(engine, map, scratch, &points, by_anchors).await?;
         let mut values = values.chunks_exact(8);
         chunks.retain_mut(|chunk| {
             for v in values.by_ref().take(chunk.mesh.positions.len()) {
@@ -181,7 +183,9 @@ impl Slam {
 
 /// Signed distances \[m\] at the points of several blocks; unknown outside the map.
 async fn distances(
-    device: &mut crate::device::Device,
+    engine: &mut Engine,
+    map: &Map,
+    scratch: &Scratch,
     blocks: &[Block],
     held: Bounds,
     truncation_m: f64,
@@ -190,7 +194,7 @@ async fn distances(
     let points: Vec<DVec3> = blocks.iter().flat_map(at).collect();
     let rows: Vec<[f32; 4]> =
         points.iter().map(|p| [p.x as f32, p.y as f32, p.z as f32, 0.0]).collect();
-    let found = device.query_distances(&rows).await?;
+    let found = passes::query_distances(engine, map, scratch, &rows).await?;
     let inside = |p: &DVec3| p.cmpge(held.min).all() && p.cmple(held.max).all();
     let mut all = points
         .iter()

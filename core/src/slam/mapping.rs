@@ -3,12 +3,16 @@ use super::semantics::steps_due;
 use super::{Breathe, Losses, Observation, Slam, SlamError};
 use crate::{
     config::{RefinePoses, Tracker},
-    device::{Batch, Device, Guidance, Rates, WINDOW_MAX},
+    engine::Engine,
     field::FieldShape,
     frame::{Bounds, Frame},
     kernels::shared::{FLAG_GUIDED, FLAG_MAP, FLAG_POSE, random_u32},
     keyframe::{Keyframe, overlap, sample_points},
     layout::RAY_OUT_FLOATS,
+    map::{
+        Batch, FrameFormat, Map, Rates, Scratch, SemanticSupervision, WINDOW_MAX, fusion, passes,
+        suppressor,
+    },
     recording::Recording,
 };
 use alloc::{collections::BTreeSet, vec::Vec};
@@ -101,10 +105,10 @@ impl Slam {
             });
         };
         self.class_counts.add(self.info.classes.len(), frame);
-        let device = self.device()?;
+        let (engine, map, _) = self.mapped()?;
         let mut r = Recording::default();
-        device.upload_frame(&mut r, slot, frame);
-        device.engine.submit(&r)?;
+        map.frames.upload_frame(&mut r, slot, frame);
+        engine.submit(&r)?;
 
         let first = self.keyframes.is_empty();
         let since = self.keyframes.last().map_or(0, |k| frame.index - k.frame);
@@ -239,17 +243,17 @@ impl Slam {
         let window_size = (m.window as usize).min(WINDOW_MAX).min(keyframes.len());
         let first_iteration = self.iteration;
         self.iteration += iterations;
-        let device = self.device()?;
+        let (engine, map, scratch) = self.mapped()?;
         let mut r = Recording::default();
         for (slot, pose) in &keyframes {
-            device.upload_pose(&mut r, *slot, pose);
+            map.frames.upload_pose(&mut r, *slot, pose);
         }
         for i in 0..iterations {
             let iteration = first_iteration + i;
             let all = (0..keyframes.len()).collect();
             let chosen = draw_window(BTreeSet::new(), all, window_size, seed, iteration);
             let window: Vec<(u32, bool)> = chosen.iter().map(|&k| (keyframes[k].0, true)).collect();
-            device.upload_window(&mut r, &window);
+            scratch.upload_window(&mut r, &window);
             let frames = window.len() as u32;
             let batch = Batch {
                 frames,
@@ -261,14 +265,16 @@ impl Slam {
                 loss: &loss,
                 iteration,
                 first: 0,
+                camera: None,
                 rare_share: s.rare_share,
-                guidance: Guidance::default(),
+                supervision: SemanticSupervision::default(),
             };
-            device.record_forward(&mut r, &batch);
-            device.record_anchor_settling(&mut r, &batch, SETTLE_RATE * left, first && i == 0);
-            submit_when_due(device, &mut r, i + 1, iterations, breathe).await?;
+            passes::record_forward(&mut r, map, scratch, &batch);
+            let (rate, begin) = (SETTLE_RATE * left, first && i == 0);
+            suppressor::record_settling(&mut r, map, scratch, &batch, rate, begin);
+            submit_when_due(engine, &mut r, i + 1, iterations, breathe).await?;
         }
-        let counts = device.read_anchor_counts().await?;
+        let counts = suppressor::read_counts(engine, map).await?;
         self.anchor_history.extend(counts.map(|c| (last_frame, c)));
         Ok(())
     }
@@ -277,14 +283,14 @@ impl Slam {
     fn refresh_targets(&mut self) -> Result<(), SlamError> {
         let keyframes: Vec<_> =
             self.keyframes.iter().map(|k| (k.slot, k.world_from_camera)).collect();
-        let device = self.device()?;
+        let (engine, map, scratch) = self.mapped()?;
         for some in keyframes.chunks(ITERATIONS_PER_RECORDING as usize) {
             let mut r = Recording::default();
             for (slot, pose) in some {
-                device.upload_pose(&mut r, *slot, pose);
-                device.record_fusion_forward(&mut r, *slot);
+                map.frames.upload_pose(&mut r, *slot, pose);
+                fusion::record_forward(&mut r, map, scratch, *slot);
             }
-            device.engine.submit(&r)?;
+            engine.submit(&r)?;
         }
         Ok(())
     }
@@ -293,7 +299,7 @@ impl Slam {
     async fn fit_bounds(&mut self, world: &[DVec3], camera: DVec3) -> Result<(), SlamError> {
         let margin = DVec3::splat(self.config.field.margin_m);
         let given = self.info.bounds.filter(|_| self.config.field.use_given_bounds);
-        if self.device.is_none() {
+        if self.map.is_none() {
             let bounds = match given {
                 Some(b) => b,
                 None => {
@@ -302,14 +308,11 @@ impl Slam {
                 }
             };
             let shape = FieldShape::new(bounds, &self.config.field);
-            let Some(engine) = self.engine.take() else { return Err(SlamError::NoMap) };
-            let classes = self.info.classes.len() as u32;
-            let (c, unit) = (self.info.camera, self.info.depth_unit_m);
-            let channels = self.info.feature_channels as u32;
-            let device =
-                Device::with_features(engine, &self.config, c, unit, classes, channels, shape)?;
-            self.free_slots = (1..device.slots).rev().collect();
-            self.device = Some(device);
+            let format = FrameFormat::from(&self.info);
+            let map = Map::new(&mut self.engine, &self.config, &format, shape)?;
+            self.scratch = Some(Scratch::new(&mut self.engine, &self.config, &map)?);
+            self.free_slots = (1..map.slots()).rev().collect();
+            self.map = Some(map);
             return Ok(());
         }
         if given.is_some() || self.bounds_refused {
@@ -318,21 +321,19 @@ impl Slam {
         let Some(b) = robust_box(world) else { return Ok(()) };
         let held = Bounds { min: b.min.min(camera), max: b.max.max(camera) };
         let (config, seed) = (self.config.field.clone(), self.config.seed);
-        let device = self.device()?;
-        if device.shape.grown(held, &config).is_none() {
+        let (engine, map, _) = self.mapped()?;
+        if map.shape.grown(held, &config).is_none() {
             return Ok(());
         }
         // Grow with the margin, so that the next frames fit as well.
         let wanted = Bounds { min: held.min - margin, max: held.max + margin };
-        if let Some(shape) = device.shape.grown(wanted, &config) {
-            if shape.surface_floats().max(shape.geometry_floats())
-                > device.engine.max_buffer_words()
-            {
+        if let Some(shape) = map.shape.grown(wanted, &config) {
+            if shape.surface_floats().max(shape.geometry_floats()) > engine.max_buffer_words() {
                 // The map stays as it is; surfaces outside it are ignored.
                 self.bounds_refused = true;
                 return Ok(());
             }
-            device.grow(shape, seed).await?;
+            map.grow(engine, shape, seed).await?;
         }
         Ok(())
     }
@@ -373,26 +374,26 @@ impl Slam {
         let ray_weights = self.class_counts.ray_weights(&loss, rare_share, s.rare_draws);
         let token_weights = self.class_counts.weights(fusion.balance);
         let rarity = self.class_counts.rarity();
-        let guidance = if semantic {
-            Guidance {
+        let supervision = if semantic {
+            SemanticSupervision {
                 compression: suppressor.final_weight,
                 feature: fusion.final_weight,
                 doubt_anchor: suppressor.doubt,
                 doubt_fused: fusion.doubt,
             }
         } else {
-            Guidance {
+            SemanticSupervision {
                 compression: self.compression(suppressor),
                 feature: self.feature(fusion),
-                ..Guidance::default()
+                ..SemanticSupervision::default()
             }
         };
-        let device = self.device()?;
+        let (engine, map, scratch) = self.mapped()?;
         let mut touched = BTreeSet::new();
         let mut r = Recording::default();
-        device.upload_class_weights(&mut r, &ray_weights, &token_weights, &rarity);
+        map.upload_class_weights(&mut r, &ray_weights, &token_weights, &rarity);
         for (slot, pose) in &keyframes {
-            device.upload_pose(&mut r, *slot, pose);
+            map.frames.upload_pose(&mut r, *slot, pose);
         }
         let mut rays = 0;
         for i in 0..iterations {
@@ -407,16 +408,16 @@ impl Slam {
                 .collect();
             for step in 0..steps_due(fusion_steps, iterations, i, 1) {
                 // Every other step goes over an earlier frame: the fusion must not forget.
-                let k = if device.fusion_steps().is_multiple_of(2) && recent > 0 {
+                let k = if map.fusion_steps().is_multiple_of(2) && recent > 0 {
                     n - 1
                 } else {
                     let at = random_u32(seed, iteration, step, 22) as usize % chosen.len();
                     chosen.iter().nth(at).copied().unwrap_or(n - 1)
                 };
-                device.record_fusion_step(&mut r, keyframes[k].0, rates.decoders);
+                fusion::record_step(&mut r, map, scratch, keyframes[k].0, rates.decoders);
             }
             touched.extend(chosen);
-            device.upload_window(&mut r, &window);
+            scratch.upload_window(&mut r, &window);
             let frames = window.len() as u32;
             let batch = Batch {
                 frames,
@@ -428,36 +429,36 @@ impl Slam {
                 loss: &loss,
                 iteration,
                 first: 0,
+                camera: None,
                 rare_share,
-                guidance,
+                supervision,
             };
             rays = batch.frames * batch.rays_per_frame;
-            device.record_forward(&mut r, &batch);
-            device.record_anchor_update(&mut r, &batch);
+            passes::record_forward(&mut r, map, scratch, &batch);
+            suppressor::record_update(&mut r, map, scratch, &batch);
             if i + 1 == iterations {
-                device.record_anchor_maintenance(&mut r, &batch);
+                suppressor::record_maintenance(&mut r, map, scratch, &batch);
             }
             if semantic {
-                device.record_semantic_backward(&mut r, &batch);
-                device.record_semantic_step(&mut r, &batch, rates);
+                passes::record_semantic_backward(&mut r, map, scratch, &batch);
+                passes::record_semantic_step(&mut r, map, scratch, &batch, rates);
             } else {
-                device.record_backward(&mut r, &batch);
+                passes::record_backward(&mut r, map, scratch, &batch);
                 if refine {
                     let (v, w) = (m.rate_translation_m, m.rate_rotation_rad);
-                    device.record_pose_step(&mut r, &batch, v, w, false);
+                    passes::record_pose_step(&mut r, map, scratch, &batch, v, w, false);
                 }
-                device.record_step(&mut r, &batch, rates);
+                passes::record_step(&mut r, map, scratch, &batch, rates);
             }
-            submit_when_due(device, &mut r, i + 1, iterations, breathe).await?;
+            submit_when_due(engine, &mut r, i + 1, iterations, breathe).await?;
         }
-        let losses = read_losses(device, rays, &loss).await?;
-        if device.read_status().await? & crate::kernels::adam::STATUS_NOT_FINITE != 0 {
+        let losses = read_losses(engine, scratch, rays, &loss).await?;
+        if map.read_status(engine).await? & crate::kernels::adam::STATUS_NOT_FINITE != 0 {
             return Err(SlamError::NotFinite { frame: last_frame });
         }
-        let counts = device.read_anchor_counts().await?;
+        let counts = suppressor::read_counts(engine, map).await?;
         if refine {
-            let slots = device.slots;
-            let poses = device.read_poses(slots).await?;
+            let poses = map.frames.read_poses(engine, map.slots()).await?;
             for k in touched {
                 let slot = keyframes[k].0 as usize;
                 if let Some(Some(pose)) = poses.get(slot) {
@@ -473,7 +474,7 @@ impl Slam {
 
 /// Submits what is recorded once it is enough, or all there is, and starts anew.
 async fn submit_when_due(
-    device: &mut Device,
+    engine: &mut Engine,
     r: &mut Recording,
     done: u32,
     iterations: u32,
@@ -482,9 +483,9 @@ async fn submit_when_due(
     if !done.is_multiple_of(ITERATIONS_PER_RECORDING) && done != iterations {
         return Ok(());
     }
-    device.engine.submit(&core::mem::take(r))?;
+    engine.submit(&core::mem::take(r))?;
     if let Some(breathe) = breathe {
-        device.engine.synchronise().await?;
+        engine.synchronise().await?;
         breathe(done, iterations).await;
     }
     Ok(())
@@ -512,11 +513,12 @@ fn draw_window(
 
 /// Weighted mean losses of the last batch.
 async fn read_losses(
-    device: &mut Device,
+    engine: &mut Engine,
+    scratch: &Scratch,
     rays: u32,
     loss: &crate::config::LossConfig,
 ) -> Result<Losses, SlamError> {
-    let out = device.read_ray_out(rays).await?;
+    let out = scratch.read_ray_out(engine, rays).await?;
     let mut l = Losses::default();
     let inv = 1.0 / f64::from(rays.max(1));
     for ray in out.chunks_exact(RAY_OUT_FLOATS) {

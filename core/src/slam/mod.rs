@@ -23,10 +23,10 @@ pub use resume::Resuming;
 
 use crate::{
     config::{Config, ConfigError, Tracker},
-    device::{AnchorCounts, Device},
     engine::{Engine, EngineError},
     frame::{Bounds, Frame, SequenceInfo},
     keyframe::Keyframe,
+    map::{AnchorCounts, Map, Scratch},
     mesh::MeshError,
     pose::Pose,
     recording::Recording,
@@ -157,11 +157,13 @@ pub struct Slam {
     config: Config,
     breathe: Option<Breathe>,
     info: SequenceInfo,
-    /// Before the first frame, whose depth may decide the bounds.
-    engine: Option<Engine>,
-    device: Option<Device>,
+    engine: Engine,
+    /// Made with the first frame, whose depth may decide the bounds.
+    map: Option<Map>,
+    /// The buffers that the passes over the map work in.
+    scratch: Option<Scratch>,
     odometer: Odometer,
-    /// Where the colours of the images on the device have been found to lie.
+    /// Where the colours of the stored images have been found to lie.
     registration: ColourRegistration,
     /// The changes of `registration`: from which frame on it was in force.
     registrations: Vec<(usize, ColourRegistration)>,
@@ -190,7 +192,7 @@ pub struct Slam {
 pub(crate) const VIEW_SLOT: u32 = 0;
 
 impl Slam {
-    /// A system that has seen nothing. The device's buffers are made with the first frame.
+    /// A system that has seen nothing. The map's buffers are made with the first frame.
     ///
     /// # Errors
     /// [`SlamError::Config`].
@@ -199,19 +201,18 @@ impl Slam {
         config: Config,
         info: &SequenceInfo,
     ) -> Result<Slam, SlamError> {
-        let mut slam = Slam::without_engine(config, info)?;
-        slam.engine = Some(engine);
-        Ok(slam)
+        Slam::on_engine(engine, config, info)
     }
 
-    fn without_engine(config: Config, info: &SequenceInfo) -> Result<Slam, SlamError> {
+    fn on_engine(engine: Engine, config: Config, info: &SequenceInfo) -> Result<Slam, SlamError> {
         config.validate()?;
         Ok(Slam {
             config,
             breathe: None,
             info: info.clone(),
-            engine: None,
-            device: None,
+            engine,
+            map: None,
+            scratch: None,
             odometer: Odometer::new(OdometryConfig::default()),
             registration: ColourRegistration::default(),
             registrations: Vec::new(),
@@ -237,7 +238,7 @@ impl Slam {
         self.clock = Some(clock);
     }
 
-    /// Cuts optimisations into slices of some iterations: after each the device's work is waited
+    /// Cuts optimisations into slices of some iterations: after each the engine's work is waited
     /// for, and `breathe` is called.
     pub fn set_breathe(&mut self, breathe: Breathe) {
         self.breathe = Some(breathe);
@@ -302,7 +303,7 @@ impl Slam {
     }
 
     /// Takes over a registration of colour that the odometry found or improved. It settles only
-    /// after some keyframes; the images of those before are still on the device, so they are read
+    /// after some keyframes; the images of those before are still stored, so they are read
     /// back, resampled and stored again. What the map has already learnt from them fades as later
     /// iterations draw from the corrected images.
     pub(super) async fn follow_registration(&mut self, frame: usize) -> Result<(), SlamError> {
@@ -317,11 +318,11 @@ impl Slam {
         let camera = self.info.camera;
         let slots: Vec<u32> = self.keyframes.iter().map(|k| k.slot).collect();
         for slot in slots {
-            let device = self.device()?;
-            let image = device.read_color(slot).await?;
+            let (engine, map, _) = self.mapped()?;
+            let image = map.frames.read_color(engine, slot).await?;
             let mut r = Recording::default();
-            device.upload_color(&mut r, slot, &change.resampled(&image, &camera));
-            device.engine.submit(&r)?;
+            map.frames.upload_color(&mut r, slot, &change.resampled(&image, &camera));
+            engine.submit(&r)?;
         }
         Ok(())
     }
@@ -354,21 +355,25 @@ impl Slam {
 
     /// The map's box \[m\], once there is a map.
     pub fn bounds(&self) -> Option<Bounds> {
-        self.device.as_ref().map(|d| d.shape.bounds)
+        self.map.as_ref().map(|m| m.shape.bounds)
     }
 
-    /// Bytes of device buffers.
+    /// Bytes of the engine's buffers.
     pub fn memory_bytes(&self) -> usize {
-        self.device.as_ref().map_or(0, |d| d.engine.allocated_bytes() as usize)
+        self.engine.allocated_bytes() as usize
     }
 
     /// Most that [`Slam::memory_bytes`] has been, as while bounds grew \[bytes\].
     pub fn peak_memory_bytes(&self) -> u64 {
-        self.device.as_ref().map_or(0, |d| d.engine.peak_bytes())
+        self.engine.peak_bytes()
     }
 
-    pub(crate) fn device(&mut self) -> Result<&mut Device, SlamError> {
-        self.device.as_mut().ok_or(SlamError::NoMap)
+    /// Engine, map and scratch buffers, once there is a map.
+    fn mapped(&mut self) -> Result<(&mut Engine, &mut Map, &Scratch), SlamError> {
+        match (&mut self.map, &self.scratch) {
+            (Some(map), Some(scratch)) => Ok((&mut self.engine, map, scratch)),
+            _ => Err(SlamError::NoMap),
+        }
     }
 
     fn check(&self, frame: &Frame) -> Result<(), SlamError> {

@@ -3,10 +3,11 @@ use super::{Slam, SlamError, VIEW_SLOT, mapping::observation_step};
 use crate::{
     camera::Camera,
     classes::UNLABELLED,
-    device::{Batch, Guidance},
+    engine::Engine,
     frame::Frame,
     kernels::shared::{FLAG_ANCHORS, FLAG_DENSE, FLAG_GUIDED},
     layout::RAY_OUT_FLOATS,
+    map::{Batch, Map, Scratch, SemanticSupervision, passes},
     mesh::{self, BlockMesher, ComponentSize, CullProtocol, Keep, Mesh, Visibility},
     pose::Pose,
     recording::Recording,
@@ -60,10 +61,9 @@ impl Slam {
     ) -> Result<View, SlamError> {
         let s = self.config.sampling.clone();
         let loss = self.config.loss.clone();
-        let own = self.info.camera;
         let inference = if self.classes_by_anchors() { FLAG_ANCHORS } else { 0 };
         let guided = if guide.is_some() { FLAG_GUIDED } else { 0 };
-        let device = self.device()?;
+        let (engine, map, scratch) = self.mapped()?;
         let pixels = camera.pixels();
         let mut view = View {
             camera: *camera,
@@ -71,10 +71,9 @@ impl Slam {
             depth_m: Vec::with_capacity(pixels),
             class: Vec::with_capacity(pixels),
         };
-        device.set_camera(camera);
         let mut first = 0;
         while first < pixels as u32 {
-            let rays = device.max_rays().min(pixels as u32 - first);
+            let rays = scratch.max_rays.min(pixels as u32 - first);
             let batch = Batch {
                 frames: 1,
                 rays_per_frame: rays,
@@ -84,28 +83,19 @@ impl Slam {
                 loss: &loss,
                 iteration: 0,
                 first,
+                camera: Some(camera),
                 rare_share: 0.0,
-                guidance: Guidance::default(),
+                supervision: SemanticSupervision::default(),
             };
             let mut r = Recording::default();
             if let (Some(frame), 0) = (guide, first) {
-                device.upload_frame(&mut r, VIEW_SLOT, frame);
+                map.frames.upload_frame(&mut r, VIEW_SLOT, frame);
             }
-            device.upload_pose(&mut r, VIEW_SLOT, pose);
-            device.upload_window(&mut r, &[(VIEW_SLOT, true)]);
-            device.record_forward(&mut r, &batch);
-            let done = device.engine.submit(&r);
-            let out = match done {
-                Ok(()) => device.read_ray_out(rays).await,
-                Err(e) => Err(e),
-            };
-            let out = match out {
-                Ok(out) => out,
-                Err(e) => {
-                    device.set_camera(&own);
-                    return Err(e.into());
-                }
-            };
+            map.frames.upload_pose(&mut r, VIEW_SLOT, pose);
+            scratch.upload_window(&mut r, &[(VIEW_SLOT, true)]);
+            passes::record_forward(&mut r, map, scratch, &batch);
+            engine.submit(&r)?;
+            let out = scratch.read_ray_out(engine, rays).await?;
             for ray in out.chunks_exact(RAY_OUT_FLOATS) {
                 let solid = ray[4] > MIN_OPACITY;
                 let byte = |x: f32| (x * 255.0 + 0.5).clamp(0.0, 255.0) as u8;
@@ -116,12 +106,11 @@ impl Slam {
             }
             first += rays;
         }
-        device.set_camera(&own);
         Ok(view)
     }
 
     /// Marching cubes of the signed distance, culled to what mapped frames observed, with colours
-    /// and classes from the map. `progress` hears 0..1.
+    /// and classes from the map. `progress` is called with shares of the work done, 0 to 1.
     ///
     /// # Errors
     /// [`SlamError::NoMap`], a resolution that is not usable, engine failures.
@@ -132,14 +121,14 @@ impl Slam {
     ) -> Result<Mesh, SlamError> {
         let truncation = self.config.field.truncation_m;
         let min_triangles = self.config.mesh.min_component_triangles as usize;
-        let device = self.device()?;
-        let mut mesher = BlockMesher::new(device.shape.bounds, resolution_m)?;
+        let (engine, map, scratch) = self.mapped()?;
+        let mut mesher = BlockMesher::new(map.shape.bounds, resolution_m)?;
         let total = mesher.total_blocks().max(1) as f64;
         while let Some(block) = mesher.next_block() {
             let coarse = block.probe(4);
-            let probe = grid_distances(device, &coarse, truncation).await?;
+            let probe = grid_distances(engine, map, scratch, &coarse, truncation).await?;
             if coarse.may_hold_surface(&probe, PROBE_SLACK_M) {
-                let distances = grid_distances(device, &block, truncation).await?;
+                let distances = grid_distances(engine, map, scratch, &block, truncation).await?;
                 mesher.add_block(&block, &distances)?;
             } else {
                 mesher.skip_block(&block)?;
@@ -170,9 +159,9 @@ impl Slam {
         let points: Vec<[f32; 4]> =
             mesh.positions.iter().map(|p| [p[0], p[1], p[2], 0.0]).collect();
         let by_anchors = self.classes_by_anchors();
-        let device = self.device()?;
-        let classes = device.classes > 0;
-        let values = device.query_surface(&points, by_anchors).await?;
+        let (engine, map, scratch) = self.mapped()?;
+        let classes = map.classes > 0;
+        let values = passes::query_surface(engine, map, scratch, &points, by_anchors).await?;
         for v in values.chunks_exact(8) {
             mesh.colors.push([v[4], v[5], v[6]].map(|x| (x * 255.0 + 0.5).clamp(0.0, 255.0) as u8));
             if classes {
@@ -186,7 +175,9 @@ impl Slam {
 
 /// Signed distances \[m\] at a block's points.
 async fn grid_distances(
-    device: &mut crate::device::Device,
+    engine: &mut Engine,
+    map: &Map,
+    scratch: &Scratch,
     block: &mesh::Block,
     truncation_m: f64,
 ) -> Result<Vec<f32>, SlamError> {
@@ -196,7 +187,7 @@ async fn grid_distances(
             [p.x as f32, p.y as f32, p.z as f32, 0.0]
         })
         .collect();
-    let mut d = device.query_distances(&points).await?;
+    let mut d = passes::query_distances(engine, map, scratch, &points).await?;
     for v in &mut d {
         *v *= truncation_m as f32;
     }

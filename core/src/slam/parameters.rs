@@ -1,6 +1,9 @@
 //! How many numbers the semantics of a map take.
 use super::{Slam, SlamError};
-use crate::layout::{CHANNELS, FEATURE};
+use crate::{
+    layout::{CHANNELS, FEATURE},
+    map::suppressor,
+};
 use serde::{Deserialize, Serialize};
 
 /// Numbers that decide a pixel's class, by part; padding is not counted. All zero without classes.
@@ -33,26 +36,26 @@ impl Slam {
     /// # Errors
     /// [`SlamError::NoMap`] before the first frame, engine failures.
     pub async fn parameters(&mut self) -> Result<ParameterCounts, SlamError> {
-        let device = self.device()?;
-        let classes = device.classes as usize;
+        let (engine, map, _) = self.mapped()?;
+        let classes = map.classes as usize;
         if classes == 0 {
             return Ok(ParameterCounts::default());
         }
-        let in_use = device.read_anchor_counts().await?;
+        let in_use = suppressor::read_counts(engine, map).await?;
         let inputs = 2 * CHANNELS;
-        if let Some(head) = &device.sample_head {
+        if let Some(head) = &map.sample_head {
             return Ok(ParameterCounts {
-                semantic_planes: device.semantic.floats,
+                semantic_planes: map.semantic.floats,
                 class_head: head.parameters.floats,
                 ..ParameterCounts::default()
             });
         }
         Ok(ParameterCounts {
-            semantic_planes: device.semantic.floats,
+            semantic_planes: map.semantic.floats,
             semantic_decoder: inputs * inputs + inputs + inputs * FEATURE + FEATURE,
             class_head: classes * (FEATURE + 1),
-            fusion: device.fusion.as_ref().map_or(0, |f| f.trained_count()),
-            anchors: device.suppressor.as_ref().map_or(0, |s| s.slots() as usize * FEATURE),
+            fusion: map.fusion.as_ref().map_or(0, |f| f.trained_count()),
+            anchors: map.suppressor.as_ref().map_or(0, |s| s.slots() as usize * FEATURE),
             anchors_in_use: in_use.map_or(0, |c| c.alive as usize),
         })
     }

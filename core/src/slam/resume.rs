@@ -5,11 +5,11 @@ use super::{
 };
 use crate::{
     config::Config,
-    device::Device,
     engine::Engine,
     field::FieldShape,
     frame::{Frame, SequenceInfo},
     keyframe::Keyframe,
+    map::{FrameFormat, Map, Scratch, color_words},
     recording::Recording,
     track::odometry::{ColourRegistration, OdometryConfig, Rebuild, since},
 };
@@ -67,8 +67,8 @@ impl Slam {
     }
 
     fn saved_words(&self, checkpoint: &Checkpoint, name: &str) -> Result<Vec<u32>, SlamError> {
-        let Some(device) = &self.device else { return Ok(Vec::new()) };
-        let buffers = device.state_buffers(self.used_slots);
+        let Some(map) = &self.map else { return Ok(Vec::new()) };
+        let buffers = map.state_buffers(self.used_slots);
         let Some(b) = buffers.iter().find(|b| b.name == name) else { return Ok(Vec::new()) };
         checkpoint.values(name, if b.floats { Dtype::F32 } else { Dtype::U32 }, b.words())
     }
@@ -113,26 +113,26 @@ impl Resuming {
         odometer.add(frame, &camera, unit, registrations)?;
         let slots: Vec<u32> =
             slam.keyframes.iter().filter(|k| k.frame == frame.index).map(|k| k.slot).collect();
-        if let (Some(device), false) = (&mut slam.device, slots.is_empty()) {
+        if let (Some(map), false) = (&slam.map, slots.is_empty()) {
             // As it was stored first, and then resampled with each change.
             let (first, later) = since(registrations, frame.index, true);
             let stored = first.registered(frame, &camera);
             let mut colors = None;
             let mut before = first;
             for (_, found) in later {
-                let image = colors.unwrap_or_else(|| Device::color_words(&stored));
+                let image = colors.unwrap_or_else(|| color_words(&stored));
                 let change = ColourRegistration { scale: found.scale / before.scale };
                 colors = Some(change.resampled(&image, &camera));
                 before = *found;
             }
             let mut r = Recording::default();
             for slot in slots {
-                device.upload_frame(&mut r, slot, &stored);
+                map.frames.upload_frame(&mut r, slot, &stored);
                 if let Some(image) = &colors {
-                    device.upload_color(&mut r, slot, image);
+                    map.frames.upload_color(&mut r, slot, image);
                 }
             }
-            device.engine.submit(&r)?;
+            slam.engine.submit(&r)?;
         }
         missing.remove(&frame.index);
         Ok(())
@@ -148,12 +148,12 @@ impl Resuming {
             return Err(wrong("frames", format!("frame {frame} is missing"), "all that are named"));
         }
         // Storing images has cleared it.
-        if let Some(device) = &mut slam.device {
-            let buffers = device.state_buffers(slam.used_slots);
+        if let Some(map) = &slam.map {
+            let buffers = map.state_buffers(slam.used_slots);
             if let Some(b) = buffers.iter().find(|b| b.name == "slots.pose_state") {
                 let mut r = Recording::default();
                 r.upload(b.buffer, 0, &pose_state);
-                device.engine.submit(&r)?;
+                slam.engine.submit(&r)?;
             }
         }
         let state = &saved.state;
@@ -167,9 +167,9 @@ impl Resuming {
     }
 }
 
-/// The system with its device, without frames and odometer.
+/// The system with its map, without frames and odometer.
 fn build(
-    engine: Engine,
+    mut engine: Engine,
     config: Config,
     info: &SequenceInfo,
     checkpoint: &Checkpoint,
@@ -180,16 +180,13 @@ fn build(
     let shape = FieldShape::restored(state.bounds, &config.field, max).ok_or_else(|| {
         wrong("bounds", format!("{:?}", state.bounds), "a map that the engine can hold")
     })?;
-    let classes = info.classes.len() as u32;
-    let (camera, unit) = (info.camera, info.depth_unit_m);
-    let channels = info.feature_channels as u32;
-    let mut device =
-        Device::with_features(engine, &config, camera, unit, classes, channels, shape)?;
-    if device.slots != state.slots {
-        return Err(wrong("slots", state.slots, format!("{}, as this engine has", device.slots)));
+    let mut map = Map::new(&mut engine, &config, &FrameFormat::from(info), shape)?;
+    let scratch = Scratch::new(&mut engine, &config, &map)?;
+    if map.slots() != state.slots {
+        return Err(wrong("slots", state.slots, format!("{}, as this engine has", map.slots())));
     }
-    device.set_counters(&state.counters);
-    for b in device.state_buffers(state.used_slots) {
+    map.set_counters(&state.counters);
+    for b in map.state_buffers(state.used_slots) {
         let dtype = if b.floats { Dtype::F32 } else { Dtype::U32 };
         let words: Vec<u32> = checkpoint.values(&b.name, dtype, b.words())?;
         if b.finite && words.iter().any(|w| !f32::from_bits(*w).is_finite()) {
@@ -197,10 +194,10 @@ fn build(
         }
         let mut r = Recording::default();
         r.upload(b.buffer, 0, &words);
-        device.engine.submit(&r)?;
+        engine.submit(&r)?;
     }
-    let mut slam = Slam::without_engine(config, info)?;
-    slam.device = Some(device);
+    let mut slam = Slam::on_engine(engine, config, info)?;
+    (slam.map, slam.scratch) = (Some(map), Some(scratch));
     slam.iteration = state.iteration;
     slam.mapping_calls = state.mapping_calls;
     slam.finished_iterations = state.finished_iterations;

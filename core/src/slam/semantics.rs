@@ -2,8 +2,8 @@
 use super::Slam;
 use crate::{
     config::{FusionConfig, Inference, LossConfig, SuppressorConfig},
-    device::ClassWeight,
     frame::Frame,
+    map::ClassWeight,
 };
 use alloc::{vec, vec::Vec};
 
@@ -90,7 +90,7 @@ impl Slam {
 
     /// Whether there is a redundancy suppressor.
     pub(super) fn has_anchors(&self) -> bool {
-        self.device.as_ref().is_some_and(|d| d.suppressor.is_some())
+        self.map.as_ref().is_some_and(|m| m.suppressor.is_some())
     }
 
     /// Takes the classes of views and meshes from the head, or from anchors that have settled, from

@@ -63,6 +63,11 @@ fn psnr_db(a: &[[u8; 3]], b: &[[u8; 3]]) -> f64 {
     mte_slam_metrics::PsnrMeter::default().add(a, b).unwrap()
 }
 
+fn stored_color(slam: &mut Slam, slot: u32) -> Vec<[u8; 4]> {
+    let (engine, map, _) = slam.mapped().unwrap();
+    block_on(map.frames.read_color(engine, slot)).unwrap()
+}
+
 #[test]
 fn the_map_gets_its_colours_where_the_odometer_found_them() {
     let mut room = Unregistered::new();
@@ -83,7 +88,7 @@ fn the_map_gets_its_colours_where_the_odometer_found_them() {
     // The first frame was stored long before anything was known.
     let first = slam.keyframes[0].clone();
     assert_eq!(first.frame, 0);
-    let stored = block_on(slam.device().unwrap().read_color(first.slot)).unwrap();
+    let stored = stored_color(&mut slam, first.slot);
     let stored: Vec<[u8; 3]> = stored.iter().map(|p| [p[0], p[1], p[2]]).collect();
     let (before, after) =
         (psnr_db(&frames[0].0.color, &frames[0].1), psnr_db(&stored, &frames[0].1));
@@ -136,8 +141,8 @@ fn a_run_goes_on_from_its_checkpoint_with_the_colours_it_had_found() {
         }
         block_on(again.finish()).unwrap();
         for k in &again.keyframes.clone() {
-            let stored = |s: &mut Slam| block_on(s.device().unwrap().read_color(k.slot)).unwrap();
-            assert!(stored(&mut slam) == stored(&mut again), "frame {}", k.frame);
+            let stored = stored_color(&mut slam, k.slot);
+            assert!(stored == stored_color(&mut again, k.slot), "frame {}", k.frame);
         }
         assert!(block_on(again.checkpoint()).unwrap() == end);
     }

@@ -2,13 +2,13 @@
 use super::{PoseEstimate, Slam, SlamError, TrackingStatus, VIEW_SLOT};
 use crate::{
     config::Tracker,
-    device::{Batch, Guidance},
     frame::Frame,
     kernels::{
         pose_step::POSE_BEST_LOSS,
         shared::{FLAG_GUIDED, FLAG_MASK, FLAG_POSE},
     },
     keyframe::sample_points,
+    map::{Batch, SemanticSupervision, passes, pose_from_words},
     pose::Pose,
     recording::Recording,
     track::{
@@ -94,14 +94,15 @@ impl Slam {
         }
         let (camera, unit, seed) = (self.info.camera, self.info.depth_unit_m, self.config.seed);
         let points = sample_points(frame, &camera, unit, t.align_pixels as usize, seed);
-        let device = self.device()?;
+        let (engine, map, scratch) = self.mapped()?;
         let mut r = Recording::default();
-        device.upload_pixels(&mut r, &points);
-        device.engine.submit(&r)?;
+        passes::upload_pixels(&mut r, scratch, &points);
+        engine.submit(&r)?;
         let guard = Guard { offered: points.len(), ..Guard::default() };
         let mut solver = gauss_newton::Solver::new(*start, prior, t.align_field_weight, guard);
         for _ in 0..t.align_iterations {
-            let sums = device.align(&solver.candidate(), points.len() as u32).await?;
+            let (pose, count) = (solver.candidate(), points.len() as u32);
+            let sums = passes::align(engine, map, scratch, &pose, count).await?;
             if solver.step(&sums) {
                 break;
             }
@@ -120,11 +121,11 @@ impl Slam {
         let Some(slot) = self.take_slot() else { return Ok(None) };
         let first_iteration = self.iteration;
         self.iteration += t.render_iterations + 1;
-        let device = self.device()?;
+        let (engine, map, scratch) = self.mapped()?;
         let mut r = Recording::default();
-        device.upload_frame(&mut r, slot, frame);
-        device.upload_pose(&mut r, slot, start);
-        device.upload_window(&mut r, &[(slot, false)]);
+        map.frames.upload_frame(&mut r, slot, frame);
+        map.frames.upload_pose(&mut r, slot, start);
+        scratch.upload_window(&mut r, &[(slot, false)]);
         // One pass more than steps: the last step's pose is judged, too.
         for i in 0..=t.render_iterations {
             let batch = Batch {
@@ -136,18 +137,19 @@ impl Slam {
                 loss: &t.render_loss,
                 iteration: first_iteration + i,
                 first: 0,
+                camera: None,
                 rare_share: 0.0,
-                guidance: Guidance::default(),
+                supervision: SemanticSupervision::default(),
             };
-            device.record_forward(&mut r, &batch);
-            device.record_backward(&mut r, &batch);
+            passes::record_forward(&mut r, map, scratch, &batch);
+            passes::record_backward(&mut r, map, scratch, &batch);
             let (v, w) = (t.render_rate_translation_m, t.render_rate_rotation_rad);
-            device.record_pose_step(&mut r, &batch, v, w, i == 0);
+            passes::record_pose_step(&mut r, map, scratch, &batch, v, w, i == 0);
         }
-        device.engine.submit(&r)?;
-        let state = device.read_pose_state(slot).await?;
+        engine.submit(&r)?;
+        let state = map.frames.read_pose_state(engine, slot).await?;
         self.free_slots.push(slot);
-        let pose = crate::device::pose_from_words(&state[POSE_BEST_LOSS + 1..POSE_BEST_LOSS + 13]);
+        let pose = pose_from_words(&state[POSE_BEST_LOSS + 1..POSE_BEST_LOSS + 13]);
         Ok(pose.filter(|_| state[POSE_BEST_LOSS] < 1e30))
     }
 

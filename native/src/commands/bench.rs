@@ -16,10 +16,12 @@ use anyhow::{Context, Result};
 use glam::DVec3;
 use mte_slam_core::{
     config::{Config, Head},
-    device::{Batch, Device, Guidance, Rates},
     engine::Engine,
     field::FieldShape,
     kernels::shared::{FLAG_GUIDED, FLAG_MAP, FLAG_MASK, FLAG_POSE},
+    map::{
+        Batch, FrameFormat, Map, Rates, Scratch, SemanticSupervision, fusion, passes, suppressor,
+    },
     recording::{Command, Recording},
 };
 use mte_slam_types::{
@@ -135,13 +137,13 @@ pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
     let mut config = Config::preset("replica").context("there is no preset `replica`")?;
     (config.mapping.rays, config.tracking.render_rays) = (4000, 2000);
     (config.sampling.stratified, config.sampling.surface) = (32, 8);
-    let mut device = set_up(chosen.engine, &config, CLASSES)?;
-    let tracking = measure(&mut device, &config, Kind::Tracking, args.iterations, screen)?;
-    let mapping = measure(&mut device, &config, Kind::Mapping, args.iterations, screen)?;
-    let modules = measure_modules(&mut device, &config, &mapping, args.iterations, screen)?;
-    let (points, align_ms) = measure_align(&mut device, &config, args.iterations)?;
-    let bytes = device.engine.allocated_bytes();
-    drop(device);
+    let mut bench = set_up(chosen.engine, &config, CLASSES)?;
+    let tracking = measure(&mut bench, &config, Kind::Tracking, args.iterations, screen)?;
+    let mapping = measure(&mut bench, &config, Kind::Mapping, args.iterations, screen)?;
+    let modules = measure_modules(&mut bench, &config, &mapping, args.iterations, screen)?;
+    let (points, align_ms) = measure_align(&mut bench, &config, args.iterations)?;
+    let bytes = bench.engine.allocated_bytes();
+    drop(bench);
     let semantic = (!args.no_baseline)
         .then(|| measure_semantic_path(&config, &args.engine, args.iterations, screen))
         .transpose()?;
@@ -228,19 +230,29 @@ fn describe_semantic_path(text: &mut String, semantic: &SemanticPath) {
     );
 }
 
-fn set_up(engine: Engine, config: &Config, classes: u32) -> Result<Device> {
+/// A map on an engine.
+struct Bench {
+    engine: Engine,
+    map: Map,
+    scratch: Scratch,
+}
+
+fn set_up(mut engine: Engine, config: &Config, classes: u32) -> Result<Bench> {
     let bounds = Bounds { min: SIZE_M * -0.5, max: SIZE_M * 0.5 };
     let shape = FieldShape::new(bounds, &config.field);
-    let mut device = Device::new(engine, config, CAMERA, DEPTH_UNIT_M, classes, shape)
-        .context("the benchmark's map cannot be set up")?;
+    let format =
+        FrameFormat { camera: CAMERA, depth_unit_m: DEPTH_UNIT_M, classes, feature_channels: 0 };
+    let failed = "the benchmark's map cannot be set up";
+    let map = Map::new(&mut engine, config, &format, shape).context(failed)?;
+    let scratch = Scratch::new(&mut engine, config, &map).context(failed)?;
     let mut r = Recording::default();
     for k in 0..WINDOW {
         let pose = Pose::from_twist(&[0.1 * f64::from(k), 0.0, 0.0, 0.0, 0.3 * f64::from(k), 0.0]);
-        device.upload_frame(&mut r, FIRST_SLOT + k, &box_frame(&pose));
-        device.upload_pose(&mut r, FIRST_SLOT + k, &pose);
+        map.frames.upload_frame(&mut r, FIRST_SLOT + k, &box_frame(&pose));
+        map.frames.upload_pose(&mut r, FIRST_SLOT + k, &pose);
     }
-    device.engine.submit(&r)?;
-    Ok(device)
+    engine.submit(&r)?;
+    Ok(Bench { engine, map, scratch })
 }
 
 /// A view of the box's inside from `pose`: checkers of colour and class.
@@ -273,12 +285,13 @@ fn box_frame(pose: &Pose) -> Frame {
 }
 
 fn record(
-    device: &mut Device,
+    bench: &mut Bench,
     config: &Config,
     kind: Kind,
     iteration: u32,
     r: &mut Recording,
 ) -> (u32, u32) {
+    let Bench { map, scratch, .. } = bench;
     let s = &config.sampling;
     let (frames, rays, flags, loss) = match kind {
         Kind::Tracking => {
@@ -292,7 +305,7 @@ fn record(
         Kind::Classes => (WINDOW, config.mapping.rays, FLAG_GUIDED, &config.loss),
         Kind::Fusion => {
             let slot = FIRST_SLOT + iteration % WINDOW;
-            device.record_fusion_step(r, slot, config.mapping.rate_decoders);
+            fusion::record_step(r, map, scratch, slot, config.mapping.rate_decoders);
             return (0, 0);
         }
         // The rays are those of the mapping iteration before.
@@ -307,30 +320,32 @@ fn record(
         loss,
         iteration,
         first: 0,
+        camera: None,
         rare_share: 0.0,
-        guidance: Guidance::default(),
+        supervision: SemanticSupervision::default(),
     };
     if let Kind::Suppressor = kind {
-        device.record_anchor_update(r, &batch);
-        device.record_anchor_maintenance(r, &batch);
+        suppressor::record_update(r, map, scratch, &batch);
+        suppressor::record_maintenance(r, map, scratch, &batch);
         return (0, 0);
     }
-    device.record_forward(r, &batch);
+    passes::record_forward(r, map, scratch, &batch);
     if let Kind::Classes = kind {
         return (rays, s.stratified + s.surface);
     }
-    device.record_backward(r, &batch);
+    passes::record_backward(r, map, scratch, &batch);
     let m = &config.mapping;
-    device.record_pose_step(r, &batch, m.rate_translation_m, m.rate_rotation_rad, iteration == 0);
+    let (v, w) = (m.rate_translation_m, m.rate_rotation_rad);
+    passes::record_pose_step(r, map, scratch, &batch, v, w, iteration == 0);
     if let Kind::Mapping = kind {
         let rates = Rates { planes: m.rate_planes, decoders: m.rate_decoders };
-        device.record_step(r, &batch, rates);
+        passes::record_step(r, map, scratch, &batch, rates);
     }
     (rays, s.stratified + s.surface)
 }
 
 fn measure(
-    device: &mut Device,
+    bench: &mut Bench,
     config: &Config,
     kind: Kind,
     iterations: usize,
@@ -347,38 +362,38 @@ fn measure(
         .map(|slot| (slot, !matches!(kind, Kind::Tracking) && slot == FIRST_SLOT))
         .collect();
     let mut r = Recording::default();
-    device.upload_window(&mut r, &window);
+    bench.scratch.upload_window(&mut r, &window);
     // Warm up: pipelines are compiled on first use.
-    let (rays, samples_a_ray) = record(device, config, kind, 0, &mut r);
-    device.engine.submit(&r)?;
-    block_on(device.engine.synchronise())?;
+    let (rays, samples_a_ray) = record(bench, config, kind, 0, &mut r);
+    bench.engine.submit(&r)?;
+    block_on(bench.engine.synchronise())?;
 
     let begin = Instant::now();
     let mut r = Recording::default();
     for i in 0..iterations {
-        record(device, config, kind, i as u32 + 1, &mut r);
+        record(bench, config, kind, i as u32 + 1, &mut r);
         // As a run does: a few iterations a submission.
         if i % 4 == 3 || i + 1 == iterations {
-            device.engine.submit(&std::mem::take(&mut r))?;
+            bench.engine.submit(&std::mem::take(&mut r))?;
         }
     }
-    block_on(device.engine.synchronise())?;
+    block_on(bench.engine.synchronise())?;
     let ms_an_iteration = ms_since(begin) / iterations as f64;
     progress.set(iterations as u64, String::new);
 
     let mut stages: Vec<Stage> = Vec::new();
     for i in 0..iterations {
         let mut r = Recording::default();
-        record(device, config, kind, (iterations + i) as u32 + 1, &mut r);
+        record(bench, config, kind, (iterations + i) as u32 + 1, &mut r);
         for command in r.commands {
             let Command::Dispatch { kernel, .. } = &command else {
-                device.engine.submit(&Recording { commands: vec![command] })?;
+                bench.engine.submit(&Recording { commands: vec![command] })?;
                 continue;
             };
             let kernel = kernel.name;
             let begin = Instant::now();
-            device.engine.submit(&Recording { commands: vec![command] })?;
-            block_on(device.engine.synchronise())?;
+            bench.engine.submit(&Recording { commands: vec![command] })?;
+            block_on(bench.engine.synchronise())?;
             let ms = ms_since(begin) / iterations as f64;
             match stages.iter_mut().find(|s| s.kernel == kernel) {
                 Some(stage) => {
@@ -396,14 +411,14 @@ fn measure(
 
 /// The modules' parts, after a measured mapping iteration on the same device.
 fn measure_modules(
-    device: &mut Device,
+    bench: &mut Bench,
     config: &Config,
     mapping: &Measured,
     iterations: usize,
     screen: Screen,
 ) -> Result<Modules> {
-    let suppressor = measure(device, config, Kind::Suppressor, iterations, screen)?;
-    let fusion = measure(device, config, Kind::Fusion, iterations, screen)?;
+    let suppressor = measure(bench, config, Kind::Suppressor, iterations, screen)?;
+    let fusion = measure(bench, config, Kind::Fusion, iterations, screen)?;
     let (mapping_iterations, steps) = (config.mapping.iterations, config.fusion.steps);
     let call_ms = mapping.ms_an_iteration * f64::from(mapping_iterations);
     let stage = |m: &Measured, name: &str| -> f64 {
@@ -437,20 +452,20 @@ fn measure_semantic_path(
     // The per-sample head takes seconds a round on a processor.
     let rounds = iterations.min(5);
     let mut progress = screen.progress("semantic path", rounds);
-    let mut devices = Vec::new();
+    let mut benches = Vec::new();
     let (mut rays, mut samples_a_ray) = (0, 0);
     for (classes, head) in [(0, Head::Ray), (CLASSES, Head::Ray), (CLASSES, Head::Sample)] {
         let mut config = config.clone();
         config.semantics.head = head;
-        let mut device = set_up(engine::start(engine)?.engine, &config, classes)?;
+        let mut bench = set_up(engine::start(engine)?.engine, &config, classes)?;
         // A whole iteration compiles pipelines and fills the buffers that the parts read.
         let mut r = Recording::default();
         let window: Vec<_> = (FIRST_SLOT..FIRST_SLOT + WINDOW).map(|slot| (slot, true)).collect();
-        device.upload_window(&mut r, &window);
-        (rays, samples_a_ray) = record(&mut device, &config, Kind::Mapping, 0, &mut r);
-        device.engine.submit(&r)?;
-        block_on(device.engine.synchronise())?;
-        devices.push((device, config));
+        bench.scratch.upload_window(&mut r, &window);
+        (rays, samples_a_ray) = record(&mut bench, &config, Kind::Mapping, 0, &mut r);
+        bench.engine.submit(&r)?;
+        block_on(bench.engine.synchronise())?;
+        benches.push((bench, config));
     }
     // Without classes, with each head; for training, without classes twice: each head is compared
     // with the kernels that it uses.
@@ -467,17 +482,17 @@ fn measure_semantic_path(
     ];
     for round in 0..rounds {
         for (times, (which, train, kernels)) in times.iter_mut().zip(&plan) {
-            let (device, config) = &mut devices[*which];
+            let (bench, config) = &mut benches[*which];
             let mut r = Recording::default();
             let kind = if *train { Kind::Mapping } else { Kind::Classes };
-            record(device, config, kind, round as u32 + 1, &mut r);
+            record(bench, config, kind, round as u32 + 1, &mut r);
             r.commands.retain(|command| match command {
                 Command::Dispatch { kernel, .. } => kernels.contains(&kernel.name),
                 _ => true,
             });
             let begin = Instant::now();
-            device.engine.submit(&r)?;
-            block_on(device.engine.synchronise())?;
+            bench.engine.submit(&r)?;
+            block_on(bench.engine.synchronise())?;
             times.push(ms_since(begin));
         }
         progress.set(round as u64 + 1, String::new);
@@ -504,7 +519,7 @@ fn measure_semantic_path(
 }
 
 /// One Gauss-Newton iteration against the field: sums of the normal equations, read back.
-fn measure_align(device: &mut Device, config: &Config, iterations: usize) -> Result<(usize, f64)> {
+fn measure_align(bench: &mut Bench, config: &Config, iterations: usize) -> Result<(usize, f64)> {
     let frame = box_frame(&Pose::IDENTITY);
     let step = CAMERA.pixels().div_ceil(config.tracking.align_pixels as usize);
     let points: Vec<[f32; 4]> = (0..CAMERA.pixels())
@@ -517,12 +532,14 @@ fn measure_align(device: &mut Device, config: &Config, iterations: usize) -> Res
         })
         .collect();
     let mut r = Recording::default();
-    device.upload_pixels(&mut r, &points);
-    device.engine.submit(&r)?;
-    block_on(device.align(&Pose::IDENTITY, points.len() as u32))?;
+    let Bench { engine, map, scratch } = bench;
+    passes::upload_pixels(&mut r, scratch, &points);
+    engine.submit(&r)?;
+    let count = points.len() as u32;
+    block_on(passes::align(engine, map, scratch, &Pose::IDENTITY, count))?;
     let begin = Instant::now();
     for _ in 0..iterations {
-        block_on(device.align(&Pose::IDENTITY, points.len() as u32))?;
+        block_on(passes::align(engine, map, scratch, &Pose::IDENTITY, count))?;
     }
     Ok((points.len(), ms_since(begin) / iterations as f64))
 }

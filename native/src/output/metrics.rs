@@ -2,7 +2,7 @@
 //! that people read at the end of a run.
 use super::timings::Spread;
 use crate::resume::SavingFigures;
-use mte_slam_core::device::AnchorCounts;
+use mte_slam_core::map::AnchorCounts;
 use mte_slam_metrics::{
     AteReport, BoundaryReport, DepthReport, MeshDepthReport, PsnrReport, SMALL_SHARE_PERCENT,
     SemanticReport, SurfaceReport,

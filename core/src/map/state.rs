@@ -1,6 +1,6 @@
-//! What of the device outlives it: the buffers that a pass reads before anything writes them, and
-//! the counters beside them. All other buffers are scratch space.
-use super::{Device, Trained};
+//! The state of a map as checkpoints keep it: the buffers that a pass reads before anything writes
+//! them, and the counters beside them.
+use super::{Map, ParameterTensor};
 use crate::{
     kernels::pose_step::POSE_STATE_FLOATS,
     layout::{ANCHOR_FLOATS, CHANNELS},
@@ -41,11 +41,11 @@ pub(crate) struct Counters {
     pub fusion_origin: [u32; 4],
 }
 
-impl Device {
+impl Map {
     /// The buffers that are state. Slots from `used_slots` on have never held a frame.
     pub(crate) fn state_buffers(&self, used_slots: u32) -> Vec<StateBuffer> {
         let mut all = Vec::new();
-        let mut parameters = |name: &str, t: &Trained, columns: usize| {
+        let mut parameters = |name: &str, t: &ParameterTensor, columns: usize| {
             for (part, buffer) in
                 [("values", t.values), ("moment1", t.moment1), ("moment2", t.moment2)]
             {
@@ -68,17 +68,22 @@ impl Device {
         if let Some(h) = &self.sample_head {
             parameters("sample_head", &h.parameters, 1);
         }
-        let slots = used_slots.min(self.slots) as usize;
+        let slots = used_slots.min(self.slots()) as usize;
         let classes = self.classes as usize;
         let mut others = vec![
             ("status", self.status, [1, 4], false),
             ("class_weights", self.class_weights, [classes, 2], true),
             ("class_rarity", self.class_rarity, [1, classes], true),
             ("token_class_weights", self.token_class_weights, [1, classes], true),
-            ("slots.pose_state", self.pose_state, [slots, POSE_STATE_FLOATS], true),
+            ("slots.pose_state", self.frames.pose_state, [slots, POSE_STATE_FLOATS], true),
         ];
         if let Some(f) = &self.fusion {
-            others.push(("slots.targets", self.targets, [slots, f.target_floats()], true));
+            others.push((
+                "slots.targets",
+                self.frames.targets,
+                [slots, f.grid.target_floats()],
+                true,
+            ));
         }
         if let Some(s) = &self.suppressor {
             let n = s.slots() as usize;

@@ -17,14 +17,14 @@ use alloc::{vec, vec::Vec};
 
 /// One layer of the fusion.
 #[derive(Clone, Copy, Debug)]
-pub struct Layer {
+pub struct FusionLayer {
     /// What it is called in the paper or the design.
     pub name: &'static str,
     /// What the kernels know of it; `weights` and `bias` are places in the parameter buffer.
     pub shape: TokenLayer,
 }
 
-impl Layer {
+impl FusionLayer {
     /// Whether the configuration runs it; its parameters are there in any case.
     pub(super) fn used(&self, config: &FusionConfig) -> bool {
         config.local || self.name != "depthwise"
@@ -32,7 +32,11 @@ impl Layer {
 }
 
 /// Layers in the order of the forward pass, and the parameters that they take.
-pub(super) fn layers(classes: u32, channels: u32, config: &FusionConfig) -> (Vec<Layer>, u32) {
+pub(super) fn layers(
+    classes: u32,
+    channels: u32,
+    config: &FusionConfig,
+) -> (Vec<FusionLayer>, u32) {
     let mut at = 0;
     let mut all = Vec::new();
     let mut add =
@@ -59,7 +63,7 @@ pub(super) fn layers(classes: u32, channels: u32, config: &FusionConfig) -> (Vec
                 shape.bias = at;
                 at += shape.bias_count();
             }
-            all.push(Layer { name, shape });
+            all.push(FusionLayer { name, shape });
         };
     let (plain, linear) = ((false, false, false), (false, false, true));
     let local = config.local_kernel;
@@ -166,7 +170,7 @@ pub(super) struct Schedule {
 impl Schedule {
     pub fn new(
         e: &mut Engine,
-        layers: &[Layer],
+        layers: &[FusionLayer],
         classes: u32,
         config: &FusionConfig,
     ) -> Result<Schedule, EngineError> {
@@ -176,7 +180,7 @@ impl Schedule {
             table.extend(&layers);
             Group { first, layers }
         };
-        let used: Vec<&Layer> = layers.iter().filter(|l| l.used(config)).collect();
+        let used: Vec<&FusionLayer> = layers.iter().filter(|l| l.used(config)).collect();
         let mut all = |steps: [Step<&[&str]>; 8]| {
             let of = |step: Step<&[&str]>| match step {
                 Step::Layers(names) => {
@@ -189,7 +193,8 @@ impl Schedule {
             steps.map(of).into_iter().collect()
         };
         let (forward, backward) = (all(FORWARD), all(BACKWARD));
-        let (features, rest): (Vec<&Layer>, _) = used.iter().partition(|l| l.name == FEATURE_LAYER);
+        let (features, rest): (Vec<&FusionLayer>, _) =
+            used.iter().partition(|l| l.name == FEATURE_LAYER);
         let weights = group(rest.iter().map(|l| l.shape).collect());
         let features = features.first().map(|l| group(vec![l.shape]));
         let head = group(vec![TokenLayer {
@@ -235,12 +240,12 @@ mod tests {
                 found.sort_unstable();
                 found
             };
-            let of = |kept: &dyn Fn(&Layer) -> bool| -> Vec<u32> {
+            let of = |kept: &dyn Fn(&FusionLayer) -> bool| -> Vec<u32> {
                 let used = all.iter().filter(|l| l.used(&config) && kept(l));
                 used.map(|l| l.shape.weights).collect()
             };
-            let own_buffer = |l: &Layer| l.name == FEATURE_LAYER;
-            let read_by_loss = |l: &Layer| l.name == "colour head";
+            let own_buffer = |l: &FusionLayer| l.name == FEATURE_LAYER;
+            let read_by_loss = |l: &FusionLayer| l.name == "colour head";
             assert_eq!(weights(&forward), of(&|l| !own_buffer(l) && !read_by_loss(l)));
             assert_eq!(weights(&backward), of(&|l| l.shape.from_raw == 0 && !read_by_loss(l)));
             assert_eq!(weights(&[s.weights]), of(&|l| !own_buffer(l)));
