@@ -1,26 +1,7 @@
 // Sparse Adam: one step on the parameters whose gradient is not zero. Twin: kernels/adam.rs.
 #import shared/dispatch.wgsl
 
-struct Params {
-    offset: u32,
-    count: u32,
-    fixed_point: u32,
-    gradient_limit: i32,
-    gradient_scale: f32,
-    learning_rate: f32,
-    beta1: f32,
-    beta2: f32,
-    epsilon: f32,
-    correction1: f32,
-    correction2: f32,
-}
-
-@group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read_write> parameters: array<f32>;
-@group(0) @binding(2) var<storage, read_write> gradient: array<u32>;
-@group(0) @binding(3) var<storage, read_write> moment1: array<f32>;
-@group(0) @binding(4) var<storage, read_write> moment2: array<f32>;
-@group(0) @binding(5) var<storage, read_write> status: array<atomic<u32>>;
+#bindings
 
 const SATURATED: u32 = 1u;
 const NOT_FINITE: u32 = 2u;

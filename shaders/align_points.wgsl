@@ -1,21 +1,14 @@
-// Normal equations of aligning a depth image to the field: one look-up a pixel, at the back-projected point.
+// Normal equations of aligning a depth image to the field: one look-up per pixel, at the back-projected point.
 // r_s = distance there [m], r_c = intensity of the field minus intensity of the pixel; Geman-McClure weights.
-// One invocation a pixel, one row of 32 floats a workgroup:
+// One invocation per pixel, one row of 32 floats per workgroup:
 // 21 upper triangle of J^T W J, 6 J^T W r, sum w r_s^2, sum w r_c^2, points, sum |r_s|, sum |r_c|.
-#import shared/params.wgsl
 #import shared/planes.wgsl
-
-@group(0) @binding(1) var<storage, read> poses: array<f32>;
-@group(0) @binding(2) var<storage, read> pixels: array<vec4f>;
-@group(0) @binding(3) var<storage, read> planes_geometry: array<vec4f>;
-@group(0) @binding(4) var<storage, read> planes_appearance: array<vec4f>;
-@group(0) @binding(5) var<storage, read> decoders: array<vec4f>;
-@group(0) @binding(6) var<storage, read_write> partials: array<f32>;
-
 #import shared/geometry.wgsl
 #import shared/geometry_gradient.wgsl
 #import shared/appearance.wgsl
 #import shared/surface.wgsl
+
+#bindings
 
 const LUMA: vec3f = vec3f(0.299, 0.587, 0.114);
 // One float a (sum, lane): 8 KiB, beside the 14 KiB of both decoders too much, so sums are staged 8 at a time.

@@ -1,8 +1,7 @@
-// Gradients of the attention at its keys and values, streamed over tiles of queries. One invocation a key.
+// Gradients of the attention at its keys and values, streamed over tiles of queries. One invocation per key.
 #import shared/tokens.wgsl
 
-@group(0) @binding(1) var<storage, read> tokens: array<f32>;
-@group(0) @binding(2) var<storage, read_write> token_gradient: array<f32>;
+#bindings
 
 var<workgroup> queries: array<vec4f, 256>;
 var<workgroup> gradients: array<vec4f, 256>;

@@ -1,8 +1,7 @@
-// Gradients of the attention at its queries (and at what was added behind it). One invocation a query.
+// Gradients of the attention at its queries (and at what was added behind it). One invocation per query.
 #import shared/tokens.wgsl
 
-@group(0) @binding(1) var<storage, read> tokens: array<f32>;
-@group(0) @binding(2) var<storage, read_write> token_gradient: array<f32>;
+#bindings
 
 var<workgroup> keys: array<vec4f, 256>;
 var<workgroup> values: array<vec4f, 256>;

@@ -1,8 +1,8 @@
 // Cross-attention softmax(Q K^T / sqrt(16)) V over the tokens of an image (paper eqs. 1-4), streamed over tiles of keys
-// with an online softmax. One invocation a query.
+// with an online softmax. One invocation per query.
 #import shared/tokens.wgsl
 
-@group(0) @binding(1) var<storage, read_write> tokens: array<f32>;
+#bindings
 
 var<workgroup> keys: array<vec4f, 256>;
 var<workgroup> values: array<vec4f, 256>;

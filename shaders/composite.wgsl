@@ -1,20 +1,12 @@
-// Weights of a ray's intervals, composited depth, opacity and features. One invocation a ray.
+// Weights of a ray's intervals, composited depth, opacity and features. One invocation per ray.
 // Features are composited before their decoders, which then run once a ray.
 #import shared/dispatch.wgsl
-#import shared/params.wgsl
+#import shared/flags.wgsl
 #import shared/rays.wgsl
 #import shared/planes.wgsl
-
-@group(0) @binding(1) var<storage, read> rays: array<Ray>;
-@group(0) @binding(2) var<storage, read> depths: array<f32>;
-@group(0) @binding(3) var<storage, read> distances: array<f32>;
-@group(0) @binding(4) var<storage, read> planes_appearance: array<vec4f>;
-@group(0) @binding(5) var<storage, read> planes_semantic: array<vec4f>;
-// Weight of the interval from sample i to i + 1; the last is 0.
-@group(0) @binding(6) var<storage, read_write> weights: array<f32>;
-@group(0) @binding(7) var<storage, read_write> ray_state: array<vec4f>;
-
 #import shared/weights.wgsl
+
+#bindings
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {

@@ -1,21 +1,13 @@
-// Gradients at the signed distances: through the interval weights (depth, colour), and the distance losses.
-// One invocation a ray.
+// Gradients at the signed distances: through the interval weights (depth, color), and the distance losses.
+// One invocation per ray.
 #import shared/dispatch.wgsl
-#import shared/params.wgsl
+#import shared/flags.wgsl
 #import shared/rays.wgsl
 #import shared/planes.wgsl
-
-@group(0) @binding(1) var<storage, read> rays: array<Ray>;
-@group(0) @binding(2) var<storage, read> depths: array<f32>;
-@group(0) @binding(3) var<storage, read> distances: array<f32>;
-@group(0) @binding(4) var<storage, read> weights: array<f32>;
-@group(0) @binding(5) var<storage, read> planes_appearance: array<vec4f>;
-@group(0) @binding(6) var<storage, read_write> ray_state: array<vec4f>;
-@group(0) @binding(7) var<storage, read_write> ray_out: array<vec4f>;
-@group(0) @binding(8) var<storage, read_write> distance_gradient: array<f32>;
-
 #import shared/appearance.wgsl
 #import shared/weights.wgsl
+
+#bindings
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {

@@ -1,24 +1,11 @@
 // Decoders and class head on composited features, their losses, and the gradients back to the features.
-// One invocation a ray. Colour 32-32-3 with sigmoid, semantic feature 32-32-16, class head 16-C linear.
+// One invocation per ray. Color 32-32-3 with sigmoid, semantic feature 32-32-16, class head 16-C linear.
 #import shared/dispatch.wgsl
-#import shared/params.wgsl
+#import shared/flags.wgsl
 #import shared/rays.wgsl
-
-@group(0) @binding(1) var<storage, read> rays: array<Ray>;
-@group(0) @binding(2) var<storage, read> decoders: array<vec4f>;
-@group(0) @binding(3) var<storage, read_write> ray_state: array<vec4f>;
-// 3 vec4 a ray: red green blue depth | opacity, class (bits), loss colour, loss depth | loss semantic, loss distance, depth error, 0.
-@group(0) @binding(4) var<storage, read_write> ray_out: array<vec4f>;
-// C floats a ray: gradient at the class logits.
-@group(0) @binding(5) var<storage, read_write> logits_gradient: array<f32>;
-// Per anchor: vector (4) | class (bits, 255: free), matches, importance, variation | age.
-@group(0) @binding(6) var<storage, read> anchors: array<vec4f>;
-// Per slot and token: fused feature (4) | weight, largest logit.
-@group(0) @binding(7) var<storage, read> targets: array<vec4f>;
-// Of each class: weight in the cross-entropy, adjustment of its logit there.
-@group(0) @binding(8) var<storage, read> class_weights: array<vec2f>;
-
 #import shared/surface.wgsl
+
+#bindings
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
@@ -39,7 +26,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     let rgb = color_output(hc);
     let geometry = ray_state[state + ${STATE_DEPTH}u];
 
-    // Colour: mean squared error over the three channels, on rays that meet a surface.
+    // Color: mean squared error over the three channels, on rays that meet a surface.
     let difference = select(rgb - r.color, vec3f(0.0), masked);
     let loss_color = dot(difference, difference) / 3.0;
     let drgb = difference * (2.0 / 3.0 * params.weight_color * inv_rays);
@@ -204,7 +191,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
             ray_state[state + ${STATE_SEMANTIC_HIDDEN_DELTA}u + q] = hs[q];
         }
         for (var q = 0u; q < 8u; q++) {
-            ray_state[state + ${STATE_SEMANTIC_GRADIENT}u + q] = input_gradient(297u, q, hs);
+            ray_state[state + ${STATE_SEMANTIC_GRADIENT}u + q] = input_gradient(${SEMANTIC_W1}u, q, hs);
         }
     }
     let out = ray * 3u;

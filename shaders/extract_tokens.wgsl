@@ -1,13 +1,9 @@
-// Raw features of each 8 x 8 sampled patch: geometry encoding, colours, class histogram. One invocation a token.
+// Raw features of each 8 x 8 sampled patch: geometry encoding, colors, class histogram. One invocation per token.
 #import shared/angle.wgsl
 #import shared/dispatch.wgsl
 #import shared/tokens.wgsl
 
-// 12 floats a slot: rotation row-major, translation. world_from_camera.
-@group(0) @binding(1) var<storage, read> poses: array<f32>;
-@group(0) @binding(2) var<storage, read> color_images: array<u32>;
-@group(0) @binding(3) var<storage, read> depth_images: array<u32>;
-@group(0) @binding(4) var<storage, read_write> raw: array<f32>;
+#bindings
 
 fn color(u: u32, v: u32) -> u32 {
     return color_images[(params.slot * params.height + v) * params.width + u];

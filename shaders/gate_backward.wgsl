@@ -1,9 +1,8 @@
-// Gradients through the gating, from F to the gate's convolution and the three modalities. One invocation a token.
+// Gradients through the gating, from F to the gate's convolution and the three modalities. One invocation per token.
 #import shared/dispatch.wgsl
 #import shared/tokens.wgsl
 
-@group(0) @binding(1) var<storage, read> tokens: array<f32>;
-@group(0) @binding(2) var<storage, read_write> token_gradient: array<f32>;
+#bindings
 
 fn sigmoid(x: f32) -> f32 {
     return 1.0 / (1.0 + exp(-x));

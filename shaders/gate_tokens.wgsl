@@ -1,8 +1,8 @@
-// Normalised gating and fusion of geometry, local semantics and refined appearance (paper eqs. 7, 8). One invocation a token.
+// Normalised gating and fusion of geometry, local semantics and refined appearance (paper eqs. 7, 8). One invocation per token.
 #import shared/dispatch.wgsl
 #import shared/tokens.wgsl
 
-@group(0) @binding(1) var<storage, read_write> tokens: array<f32>;
+#bindings
 
 fn sigmoid(x: f32) -> f32 {
     return 1.0 / (1.0 + exp(-x));

@@ -1,27 +1,20 @@
 // From gradients at the signed distances to gradients at the plane features (written over the features) and,
-// for pose refinement, at the sample positions. One invocation a strip of samples.
+// for pose refinement, at the sample positions. One invocation per strip of samples.
 #import shared/dispatch.wgsl
-#import shared/params.wgsl
+#import shared/flags.wgsl
 #import shared/rays.wgsl
 #import shared/planes.wgsl
-
-@group(0) @binding(1) var<storage, read> rays: array<Ray>;
-@group(0) @binding(2) var<storage, read> depths: array<f32>;
-@group(0) @binding(3) var<storage, read> planes_geometry: array<vec4f>;
-@group(0) @binding(4) var<storage, read> decoders: array<vec4f>;
-@group(0) @binding(5) var<storage, read> distance_gradient: array<f32>;
-@group(0) @binding(6) var<storage, read_write> features: array<vec4f>;
-@group(0) @binding(7) var<storage, read_write> position_gradient: array<vec4f>;
-
 #import shared/geometry.wgsl
 #import shared/geometry_gradient.wgsl
+
+#bindings
 
 const STRIP: u32 = ${BACKWARD_STRIP}u;
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     load_geometry_decoder(lane);
-    // A strip of samples an invocation, idle ones skipped in a loop of their own (see composite).
+    // A strip of samples per invocation, idle ones skipped in a loop of their own (see composite).
     let count = params.rays * params.samples;
     // Interleaved, so that every lane gets its share of the samples near surfaces.
     let first = linear_workgroup(wid, groups) * WORKGROUP_SIZE * STRIP + lane;

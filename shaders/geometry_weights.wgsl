@@ -1,14 +1,9 @@
-// Gradient of the geometry decoder: partial sums, one row of 820 floats a workgroup.
+// Gradient of the geometry decoder: partial sums, one row per workgroup, laid out as the decoder.
 // Activations and deltas of 64 samples meet in workgroup memory, then each lane sums its own weights.
 // Only every decoder_stride-th tile is used, scaled up: an unbiased estimate at a fraction of the cost.
-#import shared/params.wgsl
-
-@group(0) @binding(1) var<storage, read> features: array<vec4f>;
-@group(0) @binding(2) var<storage, read> distance_gradient: array<f32>;
-@group(0) @binding(3) var<storage, read> decoders: array<vec4f>;
-@group(0) @binding(4) var<storage, read_write> partials: array<vec4f>;
-
 #import shared/geometry_mlp.wgsl
+
+#bindings
 
 // 64 samples x (8 vec4 inputs + 4 vec4 deltas).
 var<workgroup> tile: array<vec4f, 768>;
@@ -79,18 +74,18 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
         }
         workgroupBarrier();
     }
-    // Same order as the decoder: W1 (128 vec4), b1 (4), W2 (64), b2 (4), W3 (4), b3 (1).
-    let row = wid.x * 205u;
+    // Lanes 0 to 3 hold sums of b1, 4 to 7 of b2, 8 to 11 of W3, lane 12 of b3.
+    let row = wid.x * ${SURFACE_VEC4}u;
     partials[row + lane * 2u] = w1a;
     partials[row + lane * 2u + 1u] = w1b;
-    partials[row + 132u + lane] = w2;
+    partials[row + ${GEOMETRY_W2}u + lane] = w2;
     if (lane < 4u) {
-        partials[row + 128u + lane] = small;
+        partials[row + ${GEOMETRY_B1}u + lane] = small;
     } else if (lane < 8u) {
-        partials[row + 192u + lane] = small;
+        partials[row + ${GEOMETRY_B2}u + lane - 4u] = small;
     } else if (lane < 12u) {
-        partials[row + 192u + lane] = small;
+        partials[row + ${GEOMETRY_W3}u + lane - 8u] = small;
     } else if (lane == 12u) {
-        partials[row + 204u] = small;
+        partials[row + ${GEOMETRY_B3}u] = small;
     }
 }

@@ -2,34 +2,7 @@
 // One workgroup, a lane for each anchor: the decisions are in order, their searches parallel.
 #import shared/rays.wgsl
 
-struct Params {
-    rays: u32,
-    // Slots, at most 256; classes, at most 255; anchors spawned at most.
-    anchors: u32,
-    classes: u32,
-    spawns: u32,
-    // Squared distances.
-    spawn_distance: f32,
-    merge_distance: f32,
-    // Largest movement an update of an anchor that may merge, importance and age below which it stays or goes.
-    stable: f32,
-    min_importance: f32,
-    min_age: f32,
-    // 1: only classes that labels bear out get anchors.
-    supported: u32,
-    spare0: u32,
-    spare1: u32,
-}
-@group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> rays: array<Ray>;
-@group(0) @binding(2) var<storage, read_write> ray_state: array<vec4f>;
-// Per anchor: vector (4) | class (bits, 255: free), matches, importance, variation | age.
-@group(0) @binding(3) var<storage, read_write> anchors: array<vec4f>;
-@group(0) @binding(4) var<storage, read_write> votes: array<f32>;
-// Alive, spawned, dropped, merged.
-@group(0) @binding(5) var<storage, read_write> anchor_counts: array<u32>;
-// Per class of the head: rays whose labels agree, and do not.
-@group(0) @binding(6) var<storage, read> class_support: array<u32>;
+#bindings
 
 const FREE: u32 = 255u;
 const NONE: u32 = 0xffffffffu;
@@ -94,7 +67,7 @@ fn next_duplicate(i: u32, cursor: u32) -> u32 {
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(local_invocation_index) lane: u32) {
-    // One lane an anchor.
+    // One lane per anchor.
     let mine = lane * ${ANCHOR_VEC4}u;
     class_at[lane] = FREE;
     marked[lane] = 0u;

@@ -1,10 +1,8 @@
 // Takes rays out of the tracking losses: those without depth, and those whose depth error exceeds ten times the
 // median. One workgroup; the median comes from a histogram over the float's exponent and 4 bits of mantissa.
-#import shared/params.wgsl
+#bindings
 
-@group(0) @binding(1) var<storage, read_write> ray_out: array<vec4f>;
-
-// Bins from 2^-16 m on, 16 an octave.
+// Bins from 2^-16 m on, 16 per octave.
 var<workgroup> bins: array<atomic<u32>, 512>;
 var<workgroup> threshold: f32;
 

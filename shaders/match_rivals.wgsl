@@ -1,22 +1,9 @@
 // The nearest anchors of the head's class and of another, for every ray; the ray counts for the head's class from here on.
-// One invocation a ray.
+// One invocation per ray.
 #import shared/dispatch.wgsl
 #import shared/rays.wgsl
 
-struct Params {
-    rays: u32,
-    anchors: u32,
-    classes: u32,
-    spare0: u32,
-}
-@group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> ray_out: array<vec4f>;
-// Per anchor: vector (4) | class (bits, 255: free), ... | ...
-@group(0) @binding(2) var<storage, read> anchors: array<vec4f>;
-@group(0) @binding(3) var<storage, read_write> rays: array<Ray>;
-@group(0) @binding(4) var<storage, read_write> ray_state: array<vec4f>;
-// Per class of the head: rays whose labels agree, and do not.
-@group(0) @binding(5) var<storage, read_write> class_support: array<atomic<u32>>;
+#bindings
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {

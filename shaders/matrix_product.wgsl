@@ -1,25 +1,6 @@
 // Product of two matrices, tile by tile through workgroup memory: a layer on every sample, its gradients at inputs,
-// and those at weights. One workgroup a (64 rows, 64 columns, split of the inner dimension), one invocation 4 x 4 of them.
-struct Params {
-    // Rows and columns of the product, inner dimension, inner indices a split.
-    rows: u32, columns: u32, depth: u32, split: u32,
-    // First float of each matrix, distance of its rows and of its columns.
-    left_offset: u32, left_row: u32, left_column: u32,
-    right_offset: u32, right_row: u32, right_column: u32,
-    product_offset: u32, product_row: u32,
-    // Floats from one split's product to the next one's.
-    split_offset: u32,
-    // bias: add row `depth` of the right matrix. rectify: no value below 0. masked: 0 where the mask is not above 0.
-    // accumulate: add to what is there. The mask lies as the product does, from mask_offset on.
-    bias: u32, rectify: u32, masked: u32, accumulate: u32, mask_offset: u32,
-    // Where the sums of the right matrix's columns are added, NONE for nowhere.
-    sums_offset: u32,
-}
-@group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> left: array<f32>;
-@group(0) @binding(2) var<storage, read> right: array<f32>;
-@group(0) @binding(3) var<storage, read> mask: array<f32>;
-@group(0) @binding(4) var<storage, read_write> product: array<f32>;
+// and those at weights. One workgroup per (64 rows, 64 columns, split of the inner dimension), one invocation per 4 x 4 of them.
+#bindings
 
 const NONE: u32 = 0xffffffffu;
 const TILE: u32 = 64u;

@@ -1,13 +1,9 @@
 // Adds the gradients at a ray's sample positions to its pose gradient (translation, rotation about the
-// camera's centre, both in world axes). One invocation a ray.
+// camera's centre, both in world axes). One invocation per ray.
 #import shared/dispatch.wgsl
-#import shared/params.wgsl
 #import shared/rays.wgsl
 
-@group(0) @binding(1) var<storage, read> rays: array<Ray>;
-@group(0) @binding(2) var<storage, read> depths: array<f32>;
-@group(0) @binding(3) var<storage, read> position_gradient: array<vec4f>;
-@group(0) @binding(4) var<storage, read_write> ray_state: array<vec4f>;
+#bindings
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {

@@ -1,24 +1,8 @@
-// One Adam step on the pose of each window frame; one workgroup a frame, its rays summed in a fixed order.
+// One Adam step on the pose of each window frame; one workgroup per frame, its rays summed in a fixed order.
 // The pose with the smallest loss so far is kept beside (the loss belongs to the pose before the step).
 #import shared/angle.wgsl
 
-struct Params {
-    rays_per_frame: u32,
-    // 1: forget moments and best pose first.
-    restart: u32,
-    learning_rate_translation: f32,
-    learning_rate_rotation: f32,
-    // Weights of the losses kept in ray_out.
-    weight_color: f32,
-    weight_depth: f32,
-}
-@group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> ray_state: array<vec4f>;
-@group(0) @binding(2) var<storage, read> ray_out: array<vec4f>;
-@group(0) @binding(3) var<storage, read> window: array<u32>;
-@group(0) @binding(4) var<storage, read_write> poses: array<f32>;
-// 36 floats a slot: moment1 (6), moment2 (6), best loss, best pose (12), loss of this step, gradient (6), 1 - 0.9^t, 1 - 0.999^t of t steps.
-@group(0) @binding(5) var<storage, read_write> pose_state: array<f32>;
+#bindings
 
 var<workgroup> partial_v: array<vec4f, WORKGROUP_SIZE>;
 var<workgroup> partial_w: array<vec4f, WORKGROUP_SIZE>;

@@ -1,22 +1,13 @@
-// The field at single points: signed distance, colour, class. One invocation a point.
+// The field at single points: signed distance, color, class. One invocation per point.
 #import shared/dispatch.wgsl
-#import shared/params.wgsl
+#import shared/flags.wgsl
 #import shared/planes.wgsl
-
-@group(0) @binding(1) var<storage, read> points: array<vec4f>;
-@group(0) @binding(2) var<storage, read> planes_geometry: array<vec4f>;
-@group(0) @binding(3) var<storage, read> planes_appearance: array<vec4f>;
-@group(0) @binding(4) var<storage, read> planes_semantic: array<vec4f>;
-@group(0) @binding(5) var<storage, read> decoders: array<vec4f>;
-// Per anchor: vector (4) | class (bits, 255: free), ... | ...
-@group(0) @binding(6) var<storage, read> anchors: array<vec4f>;
-// Distance [truncations]; for params.flags & FLAG_MAP then 2 vec4 a point: distance, class (bits), 0, 0 | rgb, 0.
-@group(0) @binding(7) var<storage, read_write> values: array<f32>;
-
 #import shared/geometry.wgsl
 #import shared/appearance.wgsl
 #import shared/semantic.wgsl
 #import shared/surface.wgsl
+
+#bindings
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {

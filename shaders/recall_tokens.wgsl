@@ -1,14 +1,10 @@
-// The map's semantic feature at each token's point, an input of the fusion. One invocation a token.
+// The map's semantic feature at each token's point, an input of the fusion. One invocation per token.
 #import shared/dispatch.wgsl
-#import shared/params.wgsl
 #import shared/planes.wgsl
-
-@group(0) @binding(1) var<storage, read> planes_semantic: array<vec4f>;
-@group(0) @binding(2) var<storage, read> decoders: array<vec4f>;
-@group(0) @binding(3) var<storage, read_write> raw: array<f32>;
-
 #import shared/semantic.wgsl
 #import shared/surface.wgsl
+
+#bindings
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {

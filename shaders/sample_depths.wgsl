@@ -1,25 +1,21 @@
-// Places the samples of each ray, sorted. One invocation a ray.
+// Places the samples of each ray, sorted. One invocation per ray.
 // With a depth: stratified up to behind the surface, and stratified around it. Without: the trained signed
 // distance at the stratified samples gives weights, and the second round is drawn from them.
 #import shared/dispatch.wgsl
-#import shared/params.wgsl
+#import shared/flags.wgsl
 #import shared/random.wgsl
 #import shared/rays.wgsl
 #import shared/planes.wgsl
-
-@group(0) @binding(1) var<storage, read> rays: array<Ray>;
-@group(0) @binding(2) var<storage, read> planes_geometry: array<vec4f>;
-@group(0) @binding(3) var<storage, read> decoders: array<vec4f>;
-@group(0) @binding(4) var<storage, read_write> depths: array<f32>;
-
 #import shared/geometry.wgsl
 #import shared/weights.wgsl
+
+#bindings
 
 fn jitter(ray: u32, k: u32) -> f32 {
     if ((params.flags & FLAG_DENSE) != 0u) {
         return 0.5;
     }
-    return random_f32(params.seed, params.iteration, ray * 256u + k, 2u);
+    return random_f32(params.seed, params.iteration, ray * 256u + k, ${SALT_JITTER}u);
 }
 
 // Depth at which the ray leaves the box.

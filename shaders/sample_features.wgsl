@@ -1,20 +1,11 @@
-// Semantic plane features of a ray's samples, for a head that runs on every one of them. One invocation a (ray, slot).
+// Semantic plane features of a ray's samples, for a head that runs on every one of them. One invocation per (ray, slot).
 // As many slots as samples: slot i is interval i. Fewer (views): the first intervals that carry weight, front to back.
 #import shared/dispatch.wgsl
-#import shared/params.wgsl
 #import shared/rays.wgsl
 #import shared/planes.wgsl
-
-@group(0) @binding(1) var<storage, read> rays: array<Ray>;
-@group(0) @binding(2) var<storage, read> depths: array<f32>;
-@group(0) @binding(3) var<storage, read> weights: array<f32>;
-@group(0) @binding(4) var<storage, read> planes_semantic: array<vec4f>;
-@group(0) @binding(5) var<storage, read_write> features: array<vec4f>;
-// Middle of the slot's interval along the ray, and its weight: 0 for an empty slot.
-@group(0) @binding(6) var<storage, read_write> slot_depths: array<f32>;
-@group(0) @binding(7) var<storage, read_write> slot_weights: array<f32>;
-
 #import shared/semantic.wgsl
+
+#bindings
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {

@@ -1,25 +1,9 @@
 // Class logits of the samples composited along the ray, the ray's class and cross-entropy, and the gradients at the
-// samples' logits, which take their place. One workgroup a ray, one invocation every 64th class.
+// samples' logits, which take their place. One workgroup per ray, one invocation every 64th class.
 #import shared/dispatch.wgsl
 #import shared/rays.wgsl
 
-struct Params {
-    // Rays of this part of the batch, and the first; the whole batch.
-    rays: u32, first_ray: u32, batch_rays: u32,
-    slots: u32, classes: u32,
-    // 1: write the gradients.
-    train: u32,
-    weight_semantic: f32,
-}
-@group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> rays: array<Ray>;
-@group(0) @binding(2) var<storage, read> slot_weights: array<f32>;
-// Of each class: weight in the cross-entropy, adjustment of its logit there.
-@group(0) @binding(3) var<storage, read> class_weights: array<vec2f>;
-// C floats a slot, from the part's first ray on.
-@group(0) @binding(4) var<storage, read_write> logits: array<f32>;
-// Only the class and the semantic loss of a ray are written.
-@group(0) @binding(5) var<storage, read_write> ray_out: array<u32>;
+#bindings
 
 var<workgroup> composited: array<f32, 256>;
 // Largest logit, sum of exponentials, factor of the gradient.

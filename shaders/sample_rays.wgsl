@@ -1,20 +1,10 @@
-// Draws the pixels of a batch and makes their world rays. One invocation a ray.
+// Draws the pixels of a batch and makes their world rays. One invocation per ray.
 #import shared/dispatch.wgsl
-#import shared/params.wgsl
+#import shared/flags.wgsl
 #import shared/random.wgsl
 #import shared/rays.wgsl
 
-// 12 floats a slot: rotation row-major, translation. world_from_camera.
-@group(0) @binding(1) var<storage, read> poses: array<f32>;
-// Slot of each window frame; the top bit fixes its pose.
-@group(0) @binding(2) var<storage, read> window: array<u32>;
-// Per slot width * height words: red, green, blue, compact class.
-@group(0) @binding(3) var<storage, read> color_images: array<u32>;
-// Per slot ceil(width * height / 2) words: two depths each.
-@group(0) @binding(4) var<storage, read> depth_images: array<u32>;
-// How rare each class is; only the order matters.
-@group(0) @binding(5) var<storage, read> class_rarity: array<f32>;
-@group(0) @binding(6) var<storage, read_write> rays: array<Ray>;
+#bindings
 
 // Rarity of a pixel's class: 0 without a class, -1 without depth.
 fn rarity(slot: u32, pixel: u32) -> f32 {
@@ -46,16 +36,16 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     var raw = 0u;
     if ((params.flags & FLAG_DENSE) == 0u) {
         // A pixel without depth gets one second draw: rays with depth teach more.
-        pixel = random_u32(params.seed, params.iteration, ray, 0u) % pixels;
+        pixel = random_u32(params.seed, params.iteration, ray, ${SALT_PIXEL}u) % pixels;
         raw = raw_depth(slot, pixel);
         if (raw == 0u) {
-            pixel = random_u32(params.seed, params.iteration, ray, 1u) % pixels;
+            pixel = random_u32(params.seed, params.iteration, ray, ${SALT_PIXEL_AGAIN}u) % pixels;
             raw = raw_depth(slot, pixel);
         }
-        if (params.classes > 0u && random_f32(params.seed, params.iteration, ray, 3u) < params.rare_share) {
+        if (params.classes > 0u && random_f32(params.seed, params.iteration, ray, ${SALT_RARE}u) < params.rare_share) {
             var best = rarity(slot, pixel);
             for (var k = 1u; k < params.rare_draws; k++) {
-                let candidate = random_u32(params.seed, params.iteration, ray * 256u + k, 4u) % pixels;
+                let candidate = random_u32(params.seed, params.iteration, ray * 256u + k, ${SALT_RARE_CANDIDATE}u) % pixels;
                 let rare = rarity(slot, candidate);
                 if (rare > best) {
                     best = rare;
@@ -78,7 +68,7 @@ fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: 
     out.origin = vec3f(poses[b + 9u], poses[b + 10u], poses[b + 11u]);
     out.depth = f32(raw) * params.depth_unit;
     out.frame = frame | (slot << 8u);
-    // A rendered view may have another size than the stored images: it has no colours to compare with.
+    // A rendered view may have another size than the stored images: it has no colors to compare with.
     var c = 0xff000000u;
     if ((params.flags & (FLAG_DENSE | FLAG_GUIDED)) != FLAG_DENSE) {
         c = color_images[slot * pixels + pixel];

@@ -1,16 +1,10 @@
-// Adds feature gradients into the geometry planes, fixed point. One invocation a (ray, level, plane, channel
-// quad): samples of the ray that share a cell are summed first, so that a cell costs 16 atomics, not 16 a sample.
+// Adds feature gradients into the geometry planes, fixed point. One invocation per (ray, level, plane, channel
+// quad): samples of the ray that share a cell are summed first, so that a cell costs 16 atomics, not 16 per sample.
 #import shared/dispatch.wgsl
-#import shared/params.wgsl
 #import shared/rays.wgsl
 #import shared/planes.wgsl
 
-@group(0) @binding(1) var<storage, read> rays: array<Ray>;
-@group(0) @binding(2) var<storage, read> depths: array<f32>;
-@group(0) @binding(3) var<storage, read> distance_gradient: array<f32>;
-@group(0) @binding(4) var<storage, read> features: array<vec4f>;
-@group(0) @binding(5) var<storage, read_write> gradient: array<atomic<i32>>;
-@group(0) @binding(6) var<storage, read_write> status: array<atomic<u32>>;
+#bindings
 
 fn add(cell: u32, quad: u32, v: vec4f) {
     let scaled = v * params.scale_geometry;

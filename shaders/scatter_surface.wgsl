@@ -1,18 +1,11 @@
 // Adds feature gradients into the appearance and semantic planes, fixed point. All samples of a ray share one
 // gradient (features are composited before decoding), so per cell only four scalars are summed.
-// One invocation a (ray, modality, level, plane, channel quad).
+// One invocation per (ray, modality, level, plane, channel quad).
 #import shared/dispatch.wgsl
-#import shared/params.wgsl
 #import shared/rays.wgsl
 #import shared/planes.wgsl
 
-@group(0) @binding(1) var<storage, read> rays: array<Ray>;
-@group(0) @binding(2) var<storage, read> depths: array<f32>;
-@group(0) @binding(3) var<storage, read> weights: array<f32>;
-@group(0) @binding(4) var<storage, read> ray_state: array<vec4f>;
-@group(0) @binding(5) var<storage, read_write> gradient_appearance: array<atomic<i32>>;
-@group(0) @binding(6) var<storage, read_write> gradient_semantic: array<atomic<i32>>;
-@group(0) @binding(7) var<storage, read_write> status: array<atomic<u32>>;
+#bindings
 
 fn add(modality: u32, cell: u32, quad: u32, v: vec4f) {
     let limited = clamp(v, vec4f(-params.contribution_limit), vec4f(params.contribution_limit));

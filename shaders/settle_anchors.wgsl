@@ -1,25 +1,9 @@
-// Anchors settle where the nearest one tells the head's class: generalised learning vector quantisation. One workgroup an anchor.
+// Anchors settle where the nearest one gives the head's class: generalised learning vector quantisation. One workgroup per anchor.
 #import shared/rays.wgsl
-
-struct Params {
-    rays: u32,
-    anchors: u32,
-    classes: u32,
-    rate: f32,
-    slope: f32,
-    spare0: u32,
-    spare1: u32,
-    spare2: u32,
-}
-@group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> rays: array<Ray>;
-@group(0) @binding(2) var<storage, read> ray_state: array<vec4f>;
-@group(0) @binding(3) var<storage, read> decoders: array<vec4f>;
-// Per anchor: vector (4) | class (bits, 255: free), ... | ...
-@group(0) @binding(4) var<storage, read_write> anchors: array<vec4f>;
-
 #import shared/head.wgsl
 #import shared/lane_sums.wgsl
+
+#bindings
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(local_invocation_index) lane: u32) {

@@ -1,13 +1,10 @@
-// Layers on the token grid: linear, 3x3 or depthwise convolution, leaky rectifier. One invocation a (token, 4 outputs).
-// Weights of a tap are input-major; a depthwise tap has one weight a channel. Off the grid inputs are 0.
+// Layers on the token grid: linear, 3x3 or depthwise convolution, leaky rectifier. One invocation per (token, 4 outputs).
+// Weights of a tap are input-major; a depthwise tap has one weight per channel. Off the grid inputs are 0.
 #import shared/dispatch.wgsl
 #import shared/tokens.wgsl
 #import shared/token_layers.wgsl
 
-@group(0) @binding(2) var<storage, read> parameters: array<f32>;
-@group(0) @binding(3) var<storage, read> raw: array<f32>;
-// Inputs and outputs are different columns of a token's row.
-@group(0) @binding(4) var<storage, read_write> tokens: array<f32>;
+#bindings
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {

@@ -1,11 +1,9 @@
-// Adds layers' contributions to the gradients at their inputs, of which no two share any. One invocation a (token, input).
+// Adds layers' contributions to the gradients at their inputs, of which no two share any. One invocation per (token, input).
 #import shared/dispatch.wgsl
 #import shared/tokens.wgsl
 #import shared/token_layers.wgsl
 
-@group(0) @binding(2) var<storage, read> parameters: array<f32>;
-@group(0) @binding(3) var<storage, read> tokens: array<f32>;
-@group(0) @binding(4) var<storage, read_write> token_gradient: array<f32>;
+#bindings
 
 // Gradient before the rectifier.
 fn delta(at: u32) -> f32 {

@@ -1,15 +1,9 @@
-// What trains the fusion: class-balanced cross-entropy and L1 of the colour, both read from F. F itself becomes the target
-// of the rays in the token's patch. One invocation a token.
+// What trains the fusion: class-balanced cross-entropy and L1 of the color, both read from F. F itself becomes the target
+// of the rays in the token's patch. One invocation per token.
 #import shared/dispatch.wgsl
 #import shared/tokens.wgsl
 
-@group(0) @binding(1) var<storage, read> parameters: array<f32>;
-@group(0) @binding(2) var<storage, read> decoders: array<f32>;
-@group(0) @binding(3) var<storage, read> class_weights: array<f32>;
-@group(0) @binding(4) var<storage, read> raw: array<f32>;
-@group(0) @binding(5) var<storage, read_write> tokens: array<f32>;
-@group(0) @binding(6) var<storage, read_write> token_gradient: array<f32>;
-@group(0) @binding(7) var<storage, read_write> targets: array<vec4f>;
+#bindings
 
 fn logit(row: u32, c: u32) -> f32 {
     let head = ${HEAD_VEC4*4}u;

@@ -1,13 +1,10 @@
 // Gradients of layers' weights and biases: sums over a chunk of tokens of input * delta; reduce_partials adds the chunks.
-// One invocation a (chunk, tap and input, 4 outputs), or a (chunk, 4 biases).
+// One invocation per (chunk, tap and input, 4 outputs), or a (chunk, 4 biases).
 #import shared/dispatch.wgsl
 #import shared/tokens.wgsl
 #import shared/token_layers.wgsl
 
-@group(0) @binding(2) var<storage, read> raw: array<f32>;
-@group(0) @binding(3) var<storage, read> tokens: array<f32>;
-@group(0) @binding(4) var<storage, read_write> token_gradient: array<f32>;
-@group(0) @binding(5) var<storage, read_write> partials: array<f32>;
+#bindings
 
 fn delta(token: u32, o: u32) -> f32 {
     let at = token * params.stride + layer.output + o;

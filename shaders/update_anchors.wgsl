@@ -1,27 +1,8 @@
-// Anchors follow the features matched to them (paper eqs. 11, 12). One workgroup an anchor.
+// Anchors follow the features matched to them (paper eqs. 11, 12). One workgroup per anchor.
 #import shared/rays.wgsl
 #import shared/lane_sums.wgsl
 
-struct Params {
-    rays: u32,
-    anchors: u32,
-    classes: u32,
-    // 0: moving average (11), 1: running mean (12).
-    rule: u32,
-    beta: f32,
-    // Matches that the running mean remembers at most.
-    memory: f32,
-    // What importance and votes keep at each update; the same of the temporal variation.
-    decay: f32,
-    variation_decay: f32,
-}
-@group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> rays: array<Ray>;
-@group(0) @binding(2) var<storage, read> ray_state: array<vec4f>;
-// Per anchor: vector (4) | class (bits, 255: free), matches, importance, variation | age.
-@group(0) @binding(3) var<storage, read_write> anchors: array<vec4f>;
-// Per anchor and class: decayed number of matched rays with that label.
-@group(0) @binding(4) var<storage, read_write> votes: array<f32>;
+#bindings
 
 var<workgroup> labels: array<atomic<u32>, 256>;
 // The class with most votes of each lane's.

@@ -1,30 +1,8 @@
 // Gradients of the decoders that run once a ray: dW[i][o] = sum over rays of input_i * delta_o, and the bias.
-// One invocation a (chunk of rays, i, four o); chunks are summed by reduce_partials. Input row I is the bias (input 1).
+// One invocation per (chunk of rays, i, four o); chunks are summed by reduce_partials. Input row I is the bias (input 1).
 #import shared/dispatch.wgsl
 
-struct Params {
-    rays: u32,
-    inputs: u32,
-    outputs: u32,
-    // Rays a chunk.
-    chunk: u32,
-    // Offsets in floats inside a ray's state.
-    input_offset: u32,
-    delta_offset: u32,
-    // 1: deltas are the logits' gradients, `outputs` floats a ray.
-    from_logits: u32,
-    // Floats a row of partials, and where this layer starts in it.
-    row: u32,
-    weight_offset: u32,
-    bias_offset: u32,
-    // Distance between the rows of W; the class head is stored output-major.
-    input_stride: u32,
-    output_stride: u32,
-}
-@group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> ray_state: array<f32>;
-@group(0) @binding(2) var<storage, read> logits_gradient: array<f32>;
-@group(0) @binding(3) var<storage, read_write> partials: array<f32>;
+#bindings
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) wid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {

@@ -3,10 +3,14 @@ use crate::{
     config::FieldConfig,
     frame::Bounds,
     kernels::shared::random_f32,
-    layout::{CHANNELS, FieldParams, GEOMETRY_FLOATS, HEAD_FLOATS},
+    layout::{CHANNELS, FieldParams, HEAD_FLOATS},
 };
 use alloc::{vec, vec::Vec};
 use glam::DVec3;
+use mte_slam_shaders::{
+    decoders::{LAYERS, Layer},
+    random::{first_values, salt},
+};
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
@@ -157,8 +161,8 @@ pub fn initial_planes(floats: usize, seed: u32, salt: u32) -> Vec<f32> {
     (0..floats as u32)
         .map(|i| {
             // Box-Muller.
-            let u = random_f32(seed, 0x1717, i, salt).max(1e-7);
-            let v = random_f32(seed, 0x1718, i, salt);
+            let u = random_f32(seed, first_values::PLANE_RADIUS, i, salt).max(1e-7);
+            let v = random_f32(seed, first_values::PLANE_ANGLE, i, salt);
             0.01 * (-2.0 * libm::logf(u)).sqrt() * libm::cosf(core::f32::consts::TAU * v)
         })
         .collect()
@@ -173,30 +177,21 @@ pub fn decoder_floats(classes: u32) -> usize {
 /// (signed distance near +0.5): it neither hides surfaces nor makes some up.
 pub fn initial_decoders(classes: u32, seed: u32) -> Vec<f32> {
     let mut w = vec![0.0; decoder_floats(classes)];
-    let mut at = 0;
-    for (inputs, outputs, gain) in [
-        (32, 16, 1.0),
-        (16, 16, 1.0),
-        (16, 1, 0.5),
-        (32, 32, 1.0),
-        (32, 4, 0.5),
-        (32, 32, 1.0),
-        (32, 16, 1.0),
-    ] {
+    let draw =
+        |at: usize| 2.0 * random_f32(seed, first_values::DECODERS, at as u32, salt::DECODERS) - 1.0;
+    // The outputs of distance and color start smaller.
+    let gains = [1.0, 1.0, 0.5, 1.0, 0.5, 1.0, 1.0];
+    for (Layer { inputs, outputs, weights, bias }, gain) in LAYERS.into_iter().zip(gains) {
         let limit = gain * (6.0 / inputs as f32).sqrt();
-        for _ in 0..inputs * outputs {
-            w[at] = (2.0 * random_f32(seed, 0x1719, at as u32, 7) - 1.0) * limit;
-            at += 1;
+        for at in weights..bias {
+            w[at] = draw(at) * limit;
         }
         if outputs == 1 {
-            w[at] = 0.55;
+            w[bias] = 0.55;
         }
-        at += if outputs == 1 { 4 } else { outputs };
     }
-    debug_assert!(at == HEAD_FLOATS && HEAD_FLOATS > GEOMETRY_FLOATS);
-    for _ in 0..classes * 16 {
-        w[at] = (2.0 * random_f32(seed, 0x1719, at as u32, 7) - 1.0) * 0.4;
-        at += 1;
+    for at in HEAD_FLOATS..HEAD_FLOATS + classes as usize * 16 {
+        w[at] = draw(at) * 0.4;
     }
     w
 }

@@ -6,17 +6,19 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 extern crate alloc;
 
+#[macro_use]
+pub mod call;
+pub mod commands;
 pub mod config;
 pub mod engine;
 pub mod field;
+pub mod kernel;
 pub mod kernels;
-pub mod keyframe;
-pub mod layout;
 pub mod map;
-pub mod recording;
-pub mod shader;
 pub mod slam;
 pub mod track;
 
 pub use mte_slam_mesh as mesh;
-pub use mte_slam_types::{camera, classes, frame, hash, pose, sequence};
+pub use mte_slam_shaders as shaders;
+pub use mte_slam_shaders::{layout, shader};
+pub use mte_slam_types::{camera, classes, frame, hash, pose, sequence, settings};

@@ -1,9 +1,9 @@
 //! Writes a few small valid inputs of every target: `cargo run --example seeds -- CORPUS`.
 use mte_slam_core::config::Config;
 use mte_slam_dataset::{Layout, MemorySource};
+use mte_slam_fuzz::{bundle::Bundle, state::Run};
 use mte_slam_mesh::{Mesh, write_ply};
 use mte_slam_types::{pose::Pose, trajectory_file::write_tum};
-use mte_slam_fuzz::{bundle::Bundle, state::Run};
 use recordings::{archive, recording};
 use std::{fs, io, path::PathBuf};
 

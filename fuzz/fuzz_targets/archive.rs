@@ -2,8 +2,8 @@
 #![no_main]
 use libfuzzer_sys::fuzz_target;
 use mte_slam_dataset::{Layout, ZipSource};
-use mte_slam_types::sequence::Source;
 use mte_slam_fuzz::{bundle::Bundle, limit_memory, recordings};
+use mte_slam_types::sequence::Source;
 use std::io::Cursor;
 
 /// As an unpacked file may have at most \[bytes\].

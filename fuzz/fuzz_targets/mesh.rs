@@ -1,8 +1,8 @@
 //! PLY meshes: what is read can be written and is the same when read again.
 #![no_main]
 use libfuzzer_sys::fuzz_target;
-use mte_slam_mesh::{read_ply, write_ply};
 use mte_slam_fuzz::limit_memory;
+use mte_slam_mesh::{read_ply, write_ply};
 
 fuzz_target!(init: limit_memory(), |data: &[u8]| {
     let Ok(mesh) = read_ply(data) else { return };

@@ -1,6 +1,10 @@
 //! What is done with a recording of any layout.
 use crate::bundle::Bundle;
-use mte_slam_dataset::{Axes, ClassList, GivenCamera, LabelSource, Layout, OpenOptions, inspect::{InspectOptions, inspect}, open};
+use mte_slam_dataset::{
+    Axes, ClassList, GivenCamera, LabelSource, Layout, OpenOptions,
+    inspect::{InspectOptions, inspect},
+    open,
+};
 use mte_slam_types::sequence::Source;
 
 /// Most frames that are decoded of one input.

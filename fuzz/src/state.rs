@@ -1,8 +1,15 @@
 //! A tiny run, and checkpoints of it that are not what they were.
 use crate::bundle::{Bundle, File};
-use mte_slam_core::{config::{Config, Tracker}, engine::Engine, slam::{Checkpoint, Slam, SlamError}};
-use mte_slam_types::{frame::{Frame, SequenceInfo}, sequence::Sequence};
+use mte_slam_core::{
+    config::{Config, Tracker},
+    engine::Engine,
+    slam::{Checkpoint, Slam, SlamError},
+};
 use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
+use mte_slam_types::{
+    frame::{Frame, SequenceInfo},
+    sequence::Sequence,
+};
 use pollster::block_on;
 
 const FRAMES: usize = 3;
@@ -14,7 +21,7 @@ pub struct Run {
     checkpoint: Checkpoint,
 }
 
-/// The smallest map and the fewest steps that still go through everything.
+/// Returns the smallest map and the fewest steps that still go through everything.
 fn config() -> Config {
     let mut config = Config { seed: 5, ..Config::default() };
     config.tracking.tracker = Tracker::Align;
@@ -54,7 +61,7 @@ impl Run {
         Run { info, frames, checkpoint }
     }
 
-    /// The state, and the smaller tensors, as the start of all inputs.
+    /// Returns the state, and the smaller tensors, as the start of all inputs.
     pub fn bundle(&self) -> Bundle {
         let state =
             File { name: b"state".into(), bytes: self.checkpoint.metadata["state"].clone().into() };
@@ -63,7 +70,7 @@ impl Run {
         Bundle { options: [0; 4], files: [state].into_iter().chain(tensors).collect() }
     }
 
-    /// The file of the checkpoint without its planes, which would make it large.
+    /// Returns the file of the checkpoint without its planes, which would make it large.
     pub fn small_file(&self) -> Vec<u8> {
         let mut small = self.checkpoint.clone();
         small.tensors.retain(|t| t.bytes.len() <= 512);

@@ -184,6 +184,13 @@ pub enum Command {
     Bench(BenchArgs),
     /// Write every composed shader to a folder, for reading
     Shaders(ShadersArgs),
+    /// List the settings with their defaults, units and ranges
+    #[command(
+        long_about = "List every setting that --set, --config and the page know, with its value in a \
+        preset, its unit and its range.\n\n\
+        Examples:\n    mte-slam settings\n    mte-slam settings rays --preset fast"
+    )]
+    Settings(SettingsArgs),
 }
 
 impl Command {
@@ -239,11 +246,11 @@ pub struct ConfigArgs {
     /// output folder repeats that run.
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, help_heading = "Configuration")]
     pub config: Option<PathBuf>,
-    /// Settings to start from: fast, replica, scannet or tum [default: by layout; demo: fast].
+    /// Settings to start from: tiny, fast, replica, scannet or tum [default: by layout; demo: fast].
     #[arg(long, value_name = "PRESET", help_heading = "Configuration")]
     pub preset: Option<String>,
-    /// Set one key, for example `mapping.iterations=30`; may be repeated. config.toml of any
-    /// output folder lists all keys.
+    /// Set one key, for example `mapping.iterations=30`; may be repeated. `mte-slam settings`
+    /// lists all keys.
     #[arg(long = "set", value_name = "KEY=VALUE", help_heading = "Configuration")]
     pub set: Vec<String>,
     /// How poses are tracked [default: by preset].
@@ -448,21 +455,26 @@ pub enum AblationRow {
     Both,
     /// Both, but the fusion without its local module.
     NoLocal,
-    /// Neither, and a perceptron 32-256-256-256-C on every sample instead of a head once a ray:
-    /// about a hundred times the work.
+    /// Neither, and a perceptron 32-256-256-256-C on every sample instead of a head once per ray:
+    /// about a hundred times the work. Only builds with the feature `sample-head` have it.
     SampleHead,
 }
 
 impl AblationRow {
-    /// All of them, as the table shows them.
-    pub const ALL: [AblationRow; 6] = [
-        AblationRow::Neither,
-        AblationRow::Mtff,
-        AblationRow::Frs,
-        AblationRow::Both,
-        AblationRow::NoLocal,
-        AblationRow::SampleHead,
-    ];
+    /// All that this build has, as the table shows them.
+    pub fn all() -> Vec<AblationRow> {
+        let mut rows = vec![
+            AblationRow::Neither,
+            AblationRow::Mtff,
+            AblationRow::Frs,
+            AblationRow::Both,
+            AblationRow::NoLocal,
+        ];
+        if mte_slam_core::map::HAS_SAMPLE_HEAD {
+            rows.push(AblationRow::SampleHead);
+        }
+        rows
+    }
 }
 
 /// `ablate`.
@@ -480,7 +492,7 @@ pub struct AblateArgs {
         value_enum,
         value_name = "ROWS",
         value_delimiter = ',',
-        default_values_t = AblationRow::ALL
+        default_values_t = AblationRow::all()
     )]
     pub rows: Vec<AblationRow>,
     /// Output folder: empty, absent, or of an ablation that is to be continued [default:
@@ -525,6 +537,23 @@ pub struct ShadersArgs {
     /// Folder to write to.
     #[arg(value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub dir: PathBuf,
+}
+
+/// `settings`.
+#[derive(Debug, Args)]
+pub struct SettingsArgs {
+    /// List only settings whose path or meaning contains this.
+    #[arg(value_name = "WORD", default_value = "", hide_default_value = true)]
+    pub word: String,
+    /// Preset whose values are listed.
+    #[arg(long, value_name = "PRESET", default_value = "replica")]
+    pub preset: String,
+    /// Print docs/guide/configuration.md.
+    #[arg(long, hide = true)]
+    pub markdown: bool,
+    /// Print the browser package's types of the settings.
+    #[arg(long, hide = true)]
+    pub typescript: bool,
 }
 
 fn pose(text: &str) -> Result<Pose, String> {

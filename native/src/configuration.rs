@@ -1,16 +1,18 @@
 //! The effective configuration: preset, then file, then `--set`, then the named flags.
 //!
-//! Keys are set on the serialised form by their dotted path, so a new key of the core's
-//! configuration works here without being mentioned. What is wrong is said with what was found
-//! and what was expected.
+//! The core knows which settings there are and what they may be; here their values are read, and
+//! the source of a wrong one (a flag or a file) is named.
 use crate::{
     args::{ConfigArgs, TrackerChoice},
     errors::{UsageError, usage},
 };
 use anyhow::{Context, Result};
-use mte_slam_core::config::Config;
+use mte_slam_core::{
+    config::{Config, ConfigError},
+    settings::{self, Value},
+};
 use serde::Deserialize;
-use toml::{Table, Value};
+use toml::Table;
 
 /// The configuration of a run, and the preset it started from.
 #[derive(Clone, Debug)]
@@ -21,7 +23,7 @@ pub struct Effective {
     pub config: Config,
 }
 
-/// Work out the configuration. `default_preset` is taken when neither the flag nor the file's
+/// Works out the configuration. `default_preset` is taken when neither the flag nor the file's
 /// `[run]` table names one.
 pub fn effective(args: &ConfigArgs, default_preset: &str) -> Result<Effective> {
     let Some(path) = &args.config else { return with_file(args, default_preset, None) };
@@ -44,19 +46,21 @@ pub fn with_file(
     };
     let recorded = file.as_ref().and_then(|(_, f)| f.preset.clone());
     let preset = args.preset.clone().or(recorded).unwrap_or_else(|| default_preset.to_owned());
-    let Some(config) = Config::preset(&preset) else {
+    let Some(mut config) = Config::preset(&preset) else {
         let known = Config::PRESETS.join(", ");
         usage!("preset: found `{preset}`, expected one of {known}");
     };
-    let mut table = Table::try_from(&config).context("the preset cannot be written as TOML")?;
     if let Some((name, file)) = file {
-        overlay(&mut table, &file.values, "", name)?;
+        settings::merge(&mut config, file.values, true).map_err(|e| refused(name, &e))?;
     }
+    let mut set = |source: &str, key: &str, value: Value| {
+        config.set(key, value).map_err(|e| refused(source, &e))
+    };
     for text in &args.set {
         let Some((key, value)) = text.split_once('=') else {
             usage!("--set {text}: found no `=`, expected KEY=VALUE, for example seed=7");
         };
-        set(&mut table, key.trim(), parse_value(value.trim()), "--set")?;
+        set("--set", key.trim(), parse_value(value.trim()))?;
     }
     if let Some(tracker) = args.tracker {
         let name = match tracker {
@@ -64,18 +68,29 @@ pub fn with_file(
             TrackerChoice::Render => "render",
             TrackerChoice::Truth => "truth",
         };
-        set(&mut table, "tracking.tracker", Value::String(name.to_owned()), "--tracker")?;
+        set("--tracker", "tracking.tracker", name.into())?;
     }
     if let Some(seed) = args.seed {
-        set(&mut table, "seed", Value::Integer(seed.into()), "--seed")?;
+        set("--seed", "seed", seed.into())?;
     }
-    let config = from_table(&table).map_err(|e| UsageError(format!("configuration: {e}")))?;
-    config.validate().map_err(|e| UsageError(e.to_string()))?;
+    config.validate().map_err(|e| refused("configuration", &e))?;
     Ok(Effective { preset, config })
 }
 
+/// `source` (a flag or a file) starts the message.
+fn refused(source: &str, error: &ConfigError) -> UsageError {
+    match error {
+        ConfigError::Unknown { similar, .. } if similar.is_empty() => {
+            let paths: Vec<String> =
+                Config::default().settings().into_iter().map(|entry| entry.path).collect();
+            UsageError(format!("{source}: {error}. There are: {}", paths.join(", ")))
+        }
+        _ => UsageError(format!("{source}: {error}")),
+    }
+}
+
 struct FileValues {
-    values: Table,
+    values: Value,
     preset: Option<String>,
 }
 
@@ -87,97 +102,9 @@ fn parse_file(name: &str, text: &str) -> Result<FileValues> {
     // What a run records beside its configuration: kept for people, not configuration.
     let run = values.remove("run");
     let preset = run.and_then(|r| Some(r.get("preset")?.as_str()?.to_owned()));
+    let values = Value::deserialize(values)
+        .map_err(|e| UsageError(format!("{name}: {}", e.message().replace('\n', " "))))?;
     Ok(FileValues { values, preset })
-}
-
-fn overlay(table: &mut Table, values: &Table, prefix: &str, source: &str) -> Result<()> {
-    for (key, value) in values {
-        let path = format!("{prefix}{key}");
-        match value {
-            Value::Table(inner) if matches!(lookup(table, &path), Some(Value::Table(_))) => {
-                overlay(table, inner, &format!("{path}."), source)?;
-            }
-            _ => set(table, &path, value.clone(), source)?,
-        }
-    }
-    Ok(())
-}
-
-fn lookup<'a>(table: &'a Table, path: &str) -> Option<&'a Value> {
-    let mut parts = path.split('.');
-    let mut value = table.get(parts.next()?)?;
-    for part in parts {
-        value = value.get(part)?;
-    }
-    Some(value)
-}
-
-fn insert(table: &mut Table, path: &str, value: Value) -> bool {
-    match path.split_once('.') {
-        None => {
-            table.insert(path.to_owned(), value);
-            true
-        }
-        Some((head, rest)) => match table.get_mut(head) {
-            Some(Value::Table(inner)) => insert(inner, rest, value),
-            _ => false,
-        },
-    }
-}
-
-/// Set one key; `source` (a flag or a file) starts the message when that cannot be.
-fn set(table: &mut Table, path: &str, value: Value, source: &str) -> Result<()> {
-    let value = match (lookup(table, path), value) {
-        (None, value) => {
-            // A key without a value (an option left open) is not in the serialised form.
-            let mut attempt = table.clone();
-            let kind = value.type_str();
-            if insert(&mut attempt, path, value) {
-                match from_table(&attempt) {
-                    Ok(_) => {
-                        *table = attempt;
-                        return Ok(());
-                    }
-                    Err(e) if !e.to_string().contains("unknown field") => {
-                        usage!("{source}: {path}: found {kind}: {}", one_line(&e))
-                    }
-                    Err(_) => {}
-                }
-            }
-            usage!("{source}: no key `{path}`. {}", suggestion(table, path));
-        }
-        (Some(Value::Table(section)), value) => usage!(
-            "{source}: {path}: found {}, expected one of its keys: {}",
-            value.type_str(),
-            section.keys().map(|k| format!("{path}.{k}")).collect::<Vec<_>>().join(", ")
-        ),
-        (Some(Value::Float(_)), Value::Integer(i)) => Value::Float(i as f64),
-        // `--set name=5` where a text is wanted.
-        (Some(Value::String(_)), value @ (Value::Integer(_) | Value::Float(_))) => {
-            Value::String(value.to_string())
-        }
-        (Some(old), value) if old.same_type(&value) => value,
-        (Some(old), value) => usage!(
-            "{source}: {path}: found {} {value}, expected {} (such as {old})",
-            value.type_str(),
-            old.type_str()
-        ),
-    };
-    let mut attempt = table.clone();
-    insert(&mut attempt, path, value.clone());
-    if let Err(e) = from_table(&attempt) {
-        usage!("{source}: {path}: found {value}: {}", one_line(&e));
-    }
-    *table = attempt;
-    Ok(())
-}
-
-fn from_table(table: &Table) -> Result<Config, toml::de::Error> {
-    Config::deserialize(Value::Table(table.clone()))
-}
-
-fn one_line(error: &toml::de::Error) -> String {
-    error.message().replace('\n', " ")
 }
 
 /// A value as TOML writes it, or else a text: `--set tracking.tracker=render` needs no quotes.
@@ -186,56 +113,8 @@ fn parse_value(text: &str) -> Value {
         .parse::<Table>()
         .ok()
         .filter(|t| t.len() == 1)
-        .and_then(|mut t| t.remove("value"))
-        .unwrap_or_else(|| Value::String(text.to_owned()))
-}
-
-fn suggestion(table: &Table, path: &str) -> String {
-    let mut keys = Vec::new();
-    flatten(table, "", &mut keys);
-    let last = path.rsplit('.').next().unwrap_or(path);
-    let mut near: Vec<(usize, &String)> = keys
-        .iter()
-        .filter_map(|key| {
-            let key_last = key.rsplit('.').next().unwrap_or(key);
-            // The right name in the wrong section, or a slip of the fingers.
-            let distance = edit_distance(key, path).min(1 + edit_distance(key_last, last));
-            (distance <= 1 + last.len() / 3).then_some((distance, key))
-        })
-        .collect();
-    near.sort();
-    near.truncate(4);
-    if near.is_empty() {
-        format!("There are: {}", keys.join(", "))
-    } else {
-        let names: Vec<_> = near.iter().map(|(_, key)| format!("`{key}`")).collect();
-        format!("Did you mean {}?", names.join(" or "))
-    }
-}
-
-fn flatten(table: &Table, prefix: &str, keys: &mut Vec<String>) {
-    for (key, value) in table {
-        match value {
-            Value::Table(inner) => flatten(inner, &format!("{prefix}{key}."), keys),
-            _ => keys.push(format!("{prefix}{key}")),
-        }
-    }
-}
-
-/// How many letters must be changed, added or left out to make one text of the other.
-pub fn edit_distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, y) in b.iter().enumerate() {
-            let substitute = diagonal + usize::from(x != *y);
-            diagonal = row[j + 1];
-            row[j + 1] = substitute.min(row[j] + 1).min(row[j + 1] + 1);
-        }
-    }
-    row[b.len()]
+        .and_then(|mut t| Value::deserialize(t.remove("value")?).ok())
+        .unwrap_or_else(|| Value::Text(text.to_owned()))
 }
 
 /// The configuration as TOML, keys in a fixed order.
@@ -272,6 +151,33 @@ mod tests {
         let e = with(&["seed=7", "tracking.tracker=render"]).unwrap();
         assert_eq!(e.config.seed, 7);
         assert_eq!(e.config.tracking.tracker, mte_slam_core::config::Tracker::Render);
+        let e = with(&["odometry.align.iterations=[1, 2, 3, 4]", "loss.color=2"]).unwrap();
+        assert_eq!(e.config.odometry.align.iterations, [1, 2, 3, 4]);
+        assert_eq!(e.config.loss.color, 2.0);
+    }
+
+    #[test]
+    fn every_preset_can_be_chosen() {
+        for name in Config::PRESETS {
+            let preset = Some(name.to_owned());
+            let e = effective(&ConfigArgs { preset, ..ConfigArgs::default() }, "replica").unwrap();
+            assert_eq!(e.config, Config::preset(name).unwrap());
+            let text = to_toml(&e.config).unwrap();
+            let file = Some(("config.toml", text.as_str()));
+            let read = with_file(&ConfigArgs::default(), "replica", file).unwrap();
+            assert_eq!(read.config, e.config);
+        }
+    }
+
+    /// A file of a version that knew fewer settings.
+    #[test]
+    fn a_file_without_the_odometry_is_read() {
+        let mut table = Table::try_from(Config::preset("tum").unwrap()).unwrap();
+        table.remove("odometry").unwrap();
+        let text = table.to_string() + "\n[run]\npreset = \"tum\"\n";
+        let file = Some(("config.toml", text.as_str()));
+        let read = with_file(&ConfigArgs::default(), "replica", file).unwrap();
+        assert_eq!(read.config, Config::preset("tum").unwrap());
     }
 
     #[test]
@@ -285,6 +191,9 @@ mod tests {
         assert!(message("tracking.tracker=laser").contains("align"));
         assert!(message("seed=-1").contains("seed"));
         assert!(message("qqqqqqq=1").contains("There are"));
+        assert!(message("tracking.render_loss.depth=-1").contains("tracking.render_loss.depth"));
+        assert!(message("odometry.align.iterations=[1,2]").contains("4 integers"));
+        assert!(message("mapping.rays=4").contains("mapping.window"));
     }
 
     #[test]

@@ -7,8 +7,8 @@ use crate::{
 use anyhow::{Result, bail};
 use mte_slam_core::engine::Engine;
 
-/// An engine and what to tell about it.
-pub struct Chosen {
+/// An engine that was started, and what is said about it.
+pub struct StartedEngine {
     /// The engine.
     pub engine: Engine,
     /// For metrics.json.
@@ -24,10 +24,10 @@ pub fn is_hardware(device_type: &str) -> bool {
     device_type != "Cpu"
 }
 
-/// Start the engine that the flags ask for. `auto` takes a hardware adapter if there is one and
+/// Starts the engine that the flags ask for. `auto` takes a hardware adapter if there is one and
 /// else the processor, and the note says which and why. An adapter that was named is never
 /// replaced by another.
-pub fn start(args: &EngineArgs) -> Result<Chosen> {
+pub fn start(args: &EngineArgs) -> Result<StartedEngine> {
     if args.engine == EngineChoice::Cpu {
         if let Some(name) = &args.adapter {
             usage!(
@@ -107,7 +107,7 @@ fn start_gpu(_adapter: Option<&str>) -> Result<Engine, String> {
     Err("this program was built without graphics adapters (feature `gpu`)".to_owned())
 }
 
-fn describe(engine: Engine, why: String) -> Chosen {
+fn describe(engine: Engine, why: String) -> StartedEngine {
     let info = engine.info();
     let note = if info.kind == "cpu" {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
@@ -121,5 +121,5 @@ fn describe(engine: Engine, why: String) -> Chosen {
         backend: info.backend,
         driver: info.driver,
     };
-    Chosen { engine, record, note }
+    StartedEngine { engine, record, note }
 }

@@ -9,7 +9,7 @@ use mte_slam_metrics::{
     AteReport, ConfusionMatrix, DepthMeter, PosePair, PsnrMeter, SemanticMeter, TrajectoryError,
     align_rigid, ate,
 };
-use mte_slam_odometry::ColourRegistration;
+use mte_slam_odometry::ColorRegistration;
 use mte_slam_types::{
     classes::ClassTable,
     frame::{Frame, SequenceInfo},
@@ -58,7 +58,7 @@ pub struct ViewScores {
     input_labels: SemanticMeter,
     frames: Vec<usize>,
     info: SequenceInfo,
-    registration: ColourRegistration,
+    registration: ColorRegistration,
 }
 
 impl ViewScores {
@@ -67,7 +67,7 @@ impl ViewScores {
     pub fn new(
         info: &SequenceInfo,
         truth: ClassTruth,
-        registration: ColourRegistration,
+        registration: ColorRegistration,
     ) -> ViewScores {
         ViewScores {
             depth: DepthMeter::default(),

@@ -9,6 +9,7 @@ mod configuration;
 mod engine;
 mod errors;
 mod evaluation;
+mod host;
 mod input;
 mod memory;
 mod mesh_evaluation;
@@ -18,12 +19,16 @@ mod pipeline;
 mod progress;
 mod record;
 mod report;
+mod restore;
+mod results;
 mod resume;
 mod screen;
 mod server;
 mod source;
+mod steps;
 mod suite;
 mod synthetic;
+mod views;
 
 use args::{Cli, Command};
 use std::process::ExitCode;
@@ -57,5 +62,6 @@ fn follow(cli: &Cli) -> anyhow::Result<()> {
         Command::Ablate(args) => commands::ablate::run(args, screen),
         Command::Bench(args) => commands::bench::run(args, screen),
         Command::Shaders(args) => commands::shaders::run(args, screen),
+        Command::Settings(args) => commands::settings::run(args, screen),
     }
 }

@@ -236,7 +236,7 @@ fn sensor_visibility(
     for index in 0..info.frames {
         let Some(world_from_camera) = sequence.truth(index) else { continue };
         let frame = sequence.frame(index)?;
-        let view = mte_slam_mesh::View {
+        let view = mte_slam_mesh::CullingView {
             camera: &info.camera,
             world_from_camera,
             depth: &frame.depth,

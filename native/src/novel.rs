@@ -6,9 +6,9 @@ use crate::{
     evaluation::ViewScores,
     input,
     output::metrics::{InferenceFigures, Metrics, NovelFigures, SniFigures},
-    pipeline::score_view,
     record::RunRecord,
     screen::Screen,
+    views::score_view,
 };
 use anyhow::{Context, Result};
 use mte_slam_core::{config::Inference, slam::Slam};
@@ -167,7 +167,7 @@ fn score(
     protocol: String,
 ) -> Result<Option<NovelFigures>> {
     let estimate_from_truth = truth_from_estimate.inverse();
-    let mut scores = ViewScores::new(info, truth, slam.colour_registration());
+    let mut scores = ViewScores::new(info, truth, slam.color_registration());
     let mut views = 0;
     while let Some(frame) = next()? {
         let Some(pose) = frame.truth else { continue };
@@ -209,7 +209,7 @@ pub fn by_inference(
     slam.set_inference(inference);
     let info = sequence.info().clone();
     let poses: Vec<Pose> = slam.trajectory().iter().map(|e| e.world_from_camera).collect();
-    let mut scores = ViewScores::new(&info, truth, slam.colour_registration());
+    let mut scores = ViewScores::new(&info, truth, slam.color_registration());
     let mut progress = screen.progress("rendering again", rendered.len());
     for (i, &index) in rendered.iter().enumerate() {
         let pose = poses.get(index).with_context(|| {

@@ -55,7 +55,8 @@ pub struct RunRecord {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unlabelled: Option<u16>,
     /// Focal length of the colour camera over that of the depth camera, as the map was trained.
-    pub colour_scale: f64,
+    #[serde(rename = "colour_scale")]
+    pub color_scale: f64,
     /// `gpu` or `cpu`.
     pub engine: String,
     /// Adapter, or processor architecture.
@@ -86,7 +87,7 @@ impl Default for RunRecord {
             features: None,
             classes: None,
             unlabelled: None,
-            colour_scale: 1.0,
+            color_scale: 1.0,
             engine: String::new(),
             adapter: String::new(),
             backend: String::new(),

@@ -1,4 +1,4 @@
-//! Checkpoints of a run while it runs, and going on from the last one.
+//! Checkpoints of a run while it runs, and its continuation from the last one.
 //!
 //! They live in `OUT/.resume`, beside the staging folder that a killed run loses: `command.json`
 //! (what was typed, and where) and `checkpoint.safetensors`, which a newer one replaces as a whole.
@@ -6,9 +6,8 @@
 use crate::{
     args::{Cli, Command},
     errors::usage,
+    host::Terminal,
     output::{checkpoint, folder::replace_file},
-    pipeline::{Processed, status_name},
-    progress::Progress,
     record::{self, RunRecord},
     suite::run_file,
 };
@@ -17,8 +16,9 @@ use clap::Parser;
 use mte_slam_core::{
     config::Config,
     engine::{Engine, EngineError},
-    slam::{Checkpoint, Slam, SlamError},
+    slam::SlamError,
 };
+use mte_slam_run::{Run, RunError, SavedRun};
 use mte_slam_types::{hash::Hasher, sequence::Sequence};
 use pollster::block_on;
 use serde::{Deserialize, Serialize};
@@ -32,8 +32,6 @@ use std::{
 pub const FOLDER: &str = ".resume";
 const CHECKPOINT: &str = "checkpoint.safetensors";
 const COMMAND: &str = "command.json";
-/// Metadata entry of what this program keeps beside the core's state.
-const HOST: &str = "run";
 /// Parts of the last optimisation (of 20 iterations) between checkpoints, at most.
 const PARTS: usize = 10;
 
@@ -144,19 +142,16 @@ fn from_file(mut cli: Cli, invocation: &Invocation) -> Result<Cli> {
 
 /// What this program keeps in a checkpoint.
 #[derive(Serialize, Deserialize)]
-struct Host {
+struct Kept {
     record: RunRecord,
     /// Of all time stamps and true poses.
     sequence_hash: String,
-    processed: Processed,
-    wall_s: f64,
 }
 
 /// An interrupted run.
 pub struct Saved {
     path: PathBuf,
-    checkpoint: Checkpoint,
-    host: Host,
+    run: SavedRun<Kept>,
 }
 
 /// The interrupted run of an output folder, if it got as far as a checkpoint.
@@ -166,13 +161,9 @@ pub fn find(out: &Path) -> Result<Option<Saved>> {
         return Ok(None);
     }
     let advice = || no_resumption(&path);
-    let mut checkpoint = checkpoint::read_file(&path).with_context(advice)?;
-    let host = checkpoint.metadata.remove(HOST);
-    let host = host.context("found a checkpoint that no run wrote").with_context(advice)?;
-    let host = serde_json::from_str(&host)
-        .context("found a checkpoint of another version of this program")
-        .with_context(advice)?;
-    Ok(Some(Saved { path: path.clone(), checkpoint, host }))
+    let run =
+        SavedRun::new(checkpoint::read_file(&path).with_context(advice)?).with_context(advice)?;
+    Ok(Some(Saved { path: path.clone(), run }))
 }
 
 fn no_resumption(path: &Path) -> String {
@@ -237,24 +228,26 @@ fn sequence_hash(sequence: &dyn Sequence) -> String {
 
 impl Saved {
     /// Frames in the checkpoint.
-    pub fn frames(&self) -> Option<usize> {
-        self.checkpoint.frames()
+    pub fn frames(&self) -> usize {
+        self.run.frames()
     }
 
-    /// The run as it was when it was saved, and what it had told so far.
+    /// The run as it was when it was saved.
     pub fn resume(
         self,
         engine: Engine,
         config: &Config,
         sequence: &mut dyn Sequence,
         record: &RunRecord,
-    ) -> Result<(Slam, Processed)> {
-        let Saved { path, checkpoint, host } = self;
+        terminal: &mut Terminal,
+    ) -> Result<Run> {
+        let Saved { path, run: saved } = self;
         let advice = || no_resumption(&path);
-        if let Some((field, found, expected)) = difference(&host.record, record, false) {
+        let before = saved.host.record.clone();
+        if let Some((field, found, expected)) = difference(&before, record, false) {
             usage!("{}: {field}: found a run with {found}, expected {expected}", advice());
         }
-        if host.sequence_hash != sequence_hash(sequence) {
+        if saved.host.sequence_hash != sequence_hash(sequence) {
             bail!(
                 "{}: data: found a run with other time stamps or true poses than {}",
                 advice(),
@@ -262,41 +255,34 @@ impl Saved {
             );
         }
         let info = sequence.info().clone();
-        let resuming = block_on(Slam::resume(engine, config.clone(), &info, &checkpoint));
-        let mut resuming = resuming.with_context(advice)?;
-        drop(checkpoint);
-        for index in resuming.missing().collect::<Vec<_>>() {
-            let frame = sequence.frame(index).with_context(|| record.dataset.clone())?;
-            resuming.add(&frame).with_context(advice)?;
-        }
-        let slam = resuming.finish().with_context(advice)?;
+        let resumed = saved.resume(engine, config.clone(), &info, sequence, terminal);
+        let mut run = match block_on(resumed) {
+            Ok(run) => run,
+            Err(RunError::Input { error, .. }) => {
+                return Err(error).with_context(|| record.dataset.clone());
+            }
+            Err(RunError::Resume(error)) => return Err(error).with_context(advice),
+            Err(error) => return Err(error).with_context(advice),
+        };
         // The reader counts what it meets in label images, for its warnings.
         if !info.classes.is_empty() {
-            for index in 0..slam.next_frame() {
+            for index in 0..run.next_frame() {
                 sequence.labels(index).with_context(|| record.dataset.clone())?;
             }
         }
-        let mut processed = host.processed;
-        if processed.timings.len() != slam.next_frame() {
-            bail!("{}: found times of {} frames", advice(), processed.timings.len());
-        }
-        for (timing, estimate) in processed.timings.iter_mut().zip(slam.trajectory()) {
-            timing.status = status_name(estimate.status);
-        }
-        processed.earlier_s = host.wall_s;
         let engine = |r: &RunRecord| (r.engine.clone(), r.adapter.clone(), r.backend.clone());
-        if engine(&host.record) != engine(record) {
-            processed.notes.push(format!(
+        if engine(&before) != engine(record) {
+            run.note(format!(
                 "resumed after frame {} on another engine ({} {} instead of {} {}): rounding \
                  differs from an uninterrupted run",
-                slam.next_frame(),
+                run.next_frame(),
                 record.engine,
                 record.adapter,
-                host.record.engine,
-                host.record.adapter
+                before.engine,
+                before.adapter
             ));
         }
-        Ok((slam, processed))
+        Ok(run)
     }
 }
 
@@ -315,9 +301,7 @@ pub struct SavingFigures {
 pub struct Saver {
     out: PathBuf,
     every: usize,
-    record: RunRecord,
-    sequence_hash: String,
-    start: Instant,
+    kept: Kept,
     /// Whether the run is under way: what fails before that changes nothing.
     begun: bool,
     /// Frames that the last checkpoint holds.
@@ -327,7 +311,7 @@ pub struct Saver {
 }
 
 impl Saver {
-    /// For a run into `out`. `resumed`: the frames of the checkpoint that it goes on from.
+    /// For a run into `out`. `resumed`: the frames of the checkpoint that it continues.
     pub fn new(
         out: &Path,
         every: usize,
@@ -338,9 +322,7 @@ impl Saver {
         Saver {
             out: out.to_owned(),
             every,
-            record: record.clone(),
-            sequence_hash: sequence_hash(sequence),
-            start: Instant::now(),
+            kept: Kept { record: record.clone(), sequence_hash: sequence_hash(sequence) },
             begun: false,
             saved: resumed,
             seconds: 0.0,
@@ -348,8 +330,8 @@ impl Saver {
         }
     }
 
-    /// The run begins, or goes on: notes how it was started. What an earlier run has left for
-    /// another one to go on from is gone with that. Whether there was something.
+    /// Notes how the run was started. What an earlier run has left to be resumed is removed, unless
+    /// this is its continuation. Returns whether there was something.
     pub fn begin(&mut self, invocation: &Invocation) -> Result<bool> {
         self.begun = true;
         let stale = self.saved.is_none() && self.folder().join(CHECKPOINT).exists();
@@ -372,76 +354,66 @@ impl Saver {
         (self.figures.count > 0).then_some(self.figures)
     }
 
-    /// Writes a checkpoint when `done` of `frames` frames say so.
-    pub fn after_frame(
-        &mut self,
-        slam: &mut Slam,
-        processed: &Processed,
-        frames: usize,
-        progress: &Progress,
-    ) -> Result<()> {
-        let done = processed.timings.len();
+    /// Writes a checkpoint when the number of frames says so, and after the last of `frames`.
+    pub fn after_frame(&mut self, run: &mut Run, frames: usize, terminal: &Terminal) -> Result<()> {
+        let done = run.next_frame();
         if self.every > 0 && (done.is_multiple_of(self.every) || done == frames) {
-            self.save(slam, processed, progress)?;
+            self.save(run, terminal)?;
         }
         Ok(())
     }
 
-    /// Writes a checkpoint when so many parts of the last optimisation, or all, say so.
+    /// Writes a checkpoint when the number of parts of the last optimisation says so, and after
+    /// the last part.
     pub fn after_part(
         &mut self,
-        slam: &mut Slam,
-        processed: &Processed,
+        run: &mut Run,
         (parts, more): (usize, bool),
-        progress: &Progress,
+        terminal: &Terminal,
     ) -> Result<()> {
         if self.every > 0 && (!more || parts.is_multiple_of(self.every.min(PARTS))) {
-            self.save(slam, processed, progress)?;
+            self.save(run, terminal)?;
         }
         Ok(())
     }
 
     /// Writes a checkpoint because the next frame cannot be read, unless this is so early that
     /// there is none at all.
-    pub fn before_failure(&mut self, slam: &mut Slam, processed: &Processed, progress: &Progress) {
-        if self.saved.is_some_and(|saved| saved < slam.next_frame()) {
+    pub fn before_failure(&mut self, run: &mut Run, terminal: &Terminal) {
+        if self.saved.is_some_and(|saved| saved < run.next_frame()) {
             // The error that brought us here is the one to report.
-            let _ = self.save(slam, processed, progress);
+            let _ = self.save(run, terminal);
         }
     }
 
-    fn save(&mut self, slam: &mut Slam, processed: &Processed, progress: &Progress) -> Result<()> {
+    fn save(&mut self, run: &mut Run, terminal: &Terminal) -> Result<()> {
         let begin = Instant::now();
-        let mut checkpoint = block_on(slam.checkpoint()).context("the run cannot be saved")?;
-        let host = serde_json::json!({
-            "record": self.record,
-            "sequence_hash": self.sequence_hash,
-            "processed": processed,
-            "wall_s": processed.earlier_s + self.start.elapsed().as_secs_f64(),
-        });
-        checkpoint.metadata.insert(HOST.to_owned(), host.to_string());
+        let checkpoint = block_on(run.checkpoint(&self.kept, terminal));
+        let Some(checkpoint) = checkpoint.context("the run cannot be saved")? else {
+            return Ok(());
+        };
         let path = self.folder().join(CHECKPOINT);
         match checkpoint::write_file(&path, &checkpoint) {
             Ok(bytes) => {
-                self.saved = Some(slam.next_frame());
+                self.saved = Some(run.next_frame());
                 self.figures.bytes = bytes;
                 self.figures.count += 1;
                 self.seconds += begin.elapsed().as_secs_f64();
                 self.figures.mean_s = self.seconds / self.figures.count as f64;
             }
             // A full disk is no reason to lose the run; the checkpoint before is still there.
-            Err(error) => progress.note(&format!("note: {error:#}; the run goes on without")),
+            Err(error) => terminal.note(&format!("note: {error:#}; the run continues without")),
         }
         Ok(())
     }
 
-    /// The results are in place: nothing is left to resume.
+    /// Removes what was kept for a resumption: the results are in place.
     pub fn remove(&self) {
         // What cannot be removed now is replaced by the next run.
         let _ = fs::remove_dir_all(self.folder());
     }
 
-    /// The run failed: says where it can be taken up, and leaves nothing where it cannot.
+    /// Adds to the error of a run where it can be resumed, and leaves nothing where it cannot.
     pub fn failed(&self, error: anyhow::Error) -> anyhow::Error {
         if !self.begun {
             return error;

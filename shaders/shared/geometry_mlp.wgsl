@@ -2,10 +2,10 @@
 // Needs binding decoders: array<vec4f>.
 // Weights lie input-major, W[k * O/4 + j] holds outputs 4j..4j+3 of input k: constant indices into
 // workgroup memory and one fused multiply-add per four products (measured 3x over a storage buffer).
-var<workgroup> gw: array<vec4f, 205>;
+var<workgroup> gw: array<vec4f, ${SURFACE_VEC4}>;
 
 fn load_geometry_decoder(lane: u32) {
-    for (var i = lane; i < 205u; i += WORKGROUP_SIZE) {
+    for (var i = lane; i < ${SURFACE_VEC4}u; i += WORKGROUP_SIZE) {
         gw[i] = decoders[i];
     }
     workgroupBarrier();
@@ -21,7 +21,7 @@ fn geometry_decoder(f: array<vec4f, 8>) -> GeometryState {
     var s: GeometryState;
     var x = f;
 #for j in 0..4
-    var a${j} = gw[${j+128}];
+    var a${j} = gw[${GEOMETRY_B1+j}];
 #end
 #for q in 0..8
 #for c in 0..4
@@ -35,22 +35,22 @@ fn geometry_decoder(f: array<vec4f, 8>) -> GeometryState {
 #end
 #for j in 0..4
     s.h1[${j}] = max(a${j}, vec4f(0.0));
-    var b${j} = gw[${j+196}];
+    var b${j} = gw[${GEOMETRY_B2+j}];
 #end
 #for q in 0..4
 #for c in 0..4
     {
         let v = vec4f(s.h1[${q}][${c}]);
 #for j in 0..4
-        b${j} = fma(gw[${132+(q*4+c)*4+j}], v, b${j});
+        b${j} = fma(gw[${GEOMETRY_W2+(q*4+c)*4+j}], v, b${j});
 #end
     }
 #end
 #end
-    var o = gw[204].x;
+    var o = gw[${GEOMETRY_B3}].x;
 #for j in 0..4
     s.h2[${j}] = max(b${j}, vec4f(0.0));
-    o += dot(gw[${j+200}], s.h2[${j}]);
+    o += dot(gw[${GEOMETRY_W3+j}], s.h2[${j}]);
 #end
     s.distance = tanh(o);
     return s;
@@ -68,14 +68,14 @@ fn geometry_deltas(state: GeometryState, g: f32) -> GeometryDeltas {
     var d: GeometryDeltas;
     d.d3 = g * (1.0 - s.distance * s.distance);
 #for j in 0..4
-    d.d2[${j}] = select(vec4f(0.0), gw[${j+200}] * d.d3, s.h2[${j}] > vec4f(0.0));
+    d.d2[${j}] = select(vec4f(0.0), gw[${GEOMETRY_W3+j}] * d.d3, s.h2[${j}] > vec4f(0.0));
 #end
 #for q in 0..4
     {
         var t = vec4f(0.0);
 #for c in 0..4
-        t[${c}] = dot(gw[${132+(q*4+c)*4}], d.d2[0]) + dot(gw[${133+(q*4+c)*4}], d.d2[1])
-            + dot(gw[${134+(q*4+c)*4}], d.d2[2]) + dot(gw[${135+(q*4+c)*4}], d.d2[3]);
+        t[${c}] = dot(gw[${GEOMETRY_W2+(q*4+c)*4}], d.d2[0]) + dot(gw[${GEOMETRY_W2+(q*4+c)*4+1}], d.d2[1])
+            + dot(gw[${GEOMETRY_W2+(q*4+c)*4+2}], d.d2[2]) + dot(gw[${GEOMETRY_W2+(q*4+c)*4+3}], d.d2[3]);
 #end
         d.d1[${q}] = select(vec4f(0.0), t, s.h1[${q}] > vec4f(0.0));
     }

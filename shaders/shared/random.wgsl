@@ -1,4 +1,4 @@
-// Counter-based random numbers: PCG output hash over a folded key. Same bits as rng.rs.
+// Counter-based random numbers: PCG output hash over a folded key. Twin: kernels/shared.rs.
 fn pcg(v: u32) -> u32 {
     let state = v * 747796405u + 2891336453u;
     let word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;

@@ -1,11 +1,11 @@
-// Colour decoder 32-32-3, semantic decoder 32-32-16, class head 16-C. Needs binding decoders: array<vec4f>.
-// In `sw` (vec4): colour W1 0, b1 256, W2 264, b2 296; semantic W1 297, b1 553, W2 561, b2 689.
+// Color decoder 32-32-3, semantic decoder 32-32-16, class head 16-C. Needs binding decoders: array<vec4f>.
+// `sw` holds the layers from COLOR_W1 = 0 on; their offsets are those of src/decoders.rs.
 // Loops stay loops here: these run once a ray, and unrolled they took a minute to compile on lavapipe.
 #import shared/head.wgsl
-var<workgroup> sw: array<vec4f, 693>;
+var<workgroup> sw: array<vec4f, ${SURFACE_SIZE_VEC4}>;
 
 fn load_surface_decoders(lane: u32) {
-    for (var i = lane; i < 693u; i += WORKGROUP_SIZE) {
+    for (var i = lane; i < ${SURFACE_SIZE_VEC4}u; i += WORKGROUP_SIZE) {
         sw[i] = decoders[i + ${SURFACE_VEC4}u];
     }
     workgroupBarrier();
@@ -21,7 +21,7 @@ fn color_hidden(f: array<vec4f, 8>) -> array<vec4f, 8> {
     var x = f;
     var h: array<vec4f, 8>;
 #for j in 0..8
-    h[${j}] = sw[${j+256}];
+    h[${j}] = sw[${COLOR_B1+j}];
 #end
     for (var q = 0u; q < 8u; q++) {
         let v = x[q];
@@ -37,18 +37,18 @@ fn color_hidden(f: array<vec4f, 8>) -> array<vec4f, 8> {
 }
 fn color_output(hidden: array<vec4f, 8>) -> vec3f {
     var h = hidden;
-    var o = sw[296];
+    var o = sw[${COLOR_B2}];
     for (var q = 0u; q < 8u; q++) {
-        let w = 264u + q * 4u;
+        let w = ${COLOR_W2}u + q * 4u;
         o += h[q].x * sw[w] + h[q].y * sw[w + 1u] + h[q].z * sw[w + 2u] + h[q].w * sw[w + 3u];
     }
     return 1.0 / (1.0 + exp(-o.xyz));
 }
-// From the gradient at the colour's pre-activation to the hidden layer's deltas.
+// From the gradient at the color's pre-activation to the hidden layer's deltas.
 fn color_hidden_delta(hidden: array<vec4f, 8>, d: vec4f) -> array<vec4f, 8> {
     var h = hidden;
     for (var q = 0u; q < 8u; q++) {
-        let w = 264u + q * 4u;
+        let w = ${COLOR_W2}u + q * 4u;
         let t = vec4f(dot(sw[w], d), dot(sw[w + 1u], d), dot(sw[w + 2u], d), dot(sw[w + 3u], d));
         h[q] = select(vec4f(0.0), t, h[q] > vec4f(0.0));
     }
@@ -63,11 +63,11 @@ fn semantic_hidden(f: array<vec4f, 8>) -> array<vec4f, 8> {
     var x = f;
     var h: array<vec4f, 8>;
 #for j in 0..8
-    h[${j}] = sw[${j+553}];
+    h[${j}] = sw[${SEMANTIC_B1+j}];
 #end
     for (var q = 0u; q < 8u; q++) {
         let v = x[q];
-        let w = 297u + q * 32u;
+        let w = ${SEMANTIC_W1}u + q * 32u;
 #for j in 0..8
         h[${j}] += v.x * sw[w + ${j}u] + v.y * sw[w + ${j+8}u] + v.z * sw[w + ${j+16}u] + v.w * sw[w + ${j+24}u];
 #end
@@ -81,11 +81,11 @@ fn semantic_output(hidden: array<vec4f, 8>) -> array<vec4f, 4> {
     var h = hidden;
     var o: array<vec4f, 4>;
 #for j in 0..4
-    o[${j}] = sw[${j+689}];
+    o[${j}] = sw[${SEMANTIC_B2+j}];
 #end
     for (var q = 0u; q < 8u; q++) {
         let v = h[q];
-        let w = 561u + q * 16u;
+        let w = ${SEMANTIC_W2}u + q * 16u;
 #for j in 0..4
         o[${j}] += v.x * sw[w + ${j}u] + v.y * sw[w + ${j+4}u] + v.z * sw[w + ${j+8}u] + v.w * sw[w + ${j+12}u];
 #end

@@ -1,21 +1,4 @@
-// Parameters of every kernel on the token grid. Twin: TokenParams in core/src/kernels/tokens.rs.
-struct Params {
-    // Grid [tokens], floats a token's activations and raw inputs take.
-    columns: u32, rows: u32, stride: u32, raw_stride: u32,
-    // Image [pixels], edge of a token [pixels], storage slot.
-    width: u32, height: u32, size: u32, slot: u32,
-    fx: f32, fy: f32, cx: f32, cy: f32,
-    box_min: vec4f,
-    // First of the raw inputs, of the dispatch's layers.
-    depth_unit: f32, classes: u32, raw_at: u32, layer: u32,
-    // First columns of queries (keys and values follow), of what is added, of the log-sum-exp.
-    query: u32, residual: u32, statistics: u32, key_stride: u32,
-    // First column of what attention gives.
-    output: u32, chunk: u32, row: u32, train: u32,
-    weight_class: f32, weight_color: f32, color_head: u32, spare0: u32,
-}
-@group(0) @binding(0) var<uniform> params: Params;
-
+// Neighbours and keys of the token grid. Needs the parameters `TokenParams`.
 const NONE: u32 = 0xffffffffu;
 // Slope of the leaky rectifiers below 0.
 const SLOPE: f32 = 0.1;

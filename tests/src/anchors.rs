@@ -1,15 +1,16 @@
 //! Cases of the kernels on anchors.
 use crate::{
     Compare, TestRandom,
-    cases::{Case, SUMS},
+    case::{Case, SUMS},
     f32_words,
     fixture::{CLASSES, words},
     tokens::random,
 };
 use mte_slam_core::{
+    commands::workgroups_1d,
     field::decoder_floats,
+    kernel::Kernel,
     kernels::{
-        Kernel,
         maintain_anchors::{MAINTAIN_ANCHORS, MaintainAnchorsParams},
         match_rivals::{MATCH_RIVALS, MatchRivalsParams},
         settle_anchors::{SETTLE_ANCHORS, SettleAnchorsParams},
@@ -20,7 +21,6 @@ use mte_slam_core::{
         ANCHOR_FLOATS, FEATURE, HEAD_FLOATS, NO_ANCHOR, NO_DISTANCE, RAY_OUT_FLOATS,
         RAY_STATE_FLOATS, STATE_ANCHOR, STATE_FEATURE,
     },
-    recording::workgroups_1d,
 };
 use std::collections::BTreeSet;
 
@@ -113,12 +113,16 @@ fn anchor_tolerance(kernel: &Kernel) -> Vec<Compare> {
         "votes" => Compare::Columns { row: CLASSES as usize, bits: &[], relative: SUMS },
         "ray_state" => Compare::Columns {
             row: RAY_STATE_FLOATS,
-            bits: if kernel.name == MATCH_RIVALS.name { &INDICES } else { &INDICES[..1] },
+            bits: if kernel.interface.name == MATCH_RIVALS.interface.name {
+                &INDICES
+            } else {
+                &INDICES[..1]
+            },
             relative: SUMS,
         },
         _ => Compare::U32,
     };
-    kernel.bindings.iter().map(|binding| one(binding.name)).collect()
+    kernel.interface.bindings.iter().map(|binding| one(binding.name)).collect()
 }
 
 /// Anchors among the features, every fifth slot free, of the first `classes` classes.

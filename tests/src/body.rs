@@ -1,24 +1,27 @@
 //! The bodies of the consistency tests, which run natively and in a browser.
 use crate::{
     Tolerance,
-    cases::Case,
+    case::Case,
     compare_outputs,
     fixture::{POISON, run_words_async},
-    recorded::Outcome,
 };
 use mte_slam_core::{
     config::{Config, Tracker},
     engine::{Engine, EngineError},
-    slam::{Slam, SlamError},
+    slam::SlamError,
 };
+use mte_slam_run::{Run, RunError};
 use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
 use mte_slam_types::{pose::Pose, sequence::Sequence};
 
 /// All buffers after a case.
+pub type Outcome = Vec<Vec<u32>>;
+
+/// Runs a case and returns all buffers afterwards.
 ///
 /// # Errors
 /// The engine's.
-pub async fn run_case(engine: &mut Engine, case: &Case) -> Result<Vec<Vec<u32>>, EngineError> {
+pub async fn run_case(engine: &mut Engine, case: &Case) -> Result<Outcome, EngineError> {
     run_words_async(engine, case.kernel, &case.params, &case.buffers, case.workgroups).await
 }
 
@@ -36,7 +39,7 @@ pub async fn check_cases(
         return Err(format!("{} cases, {} expected results", cases.len(), expected.len()));
     }
     for (case, expected) in cases.iter().zip(expected) {
-        let name = (case.kernel.name, case.name);
+        let name = (case.kernel.interface.name, case.name);
         let failed = |e: EngineError| format!("{name:?}: {e}");
         let found = run_case(engine, case).await.map_err(failed)?;
         compare_outputs(case.kernel, expected, &found, &Tolerance(case.tolerance.clone()))
@@ -45,7 +48,7 @@ pub async fn check_cases(
             continue;
         }
         let mut dirty = case.buffers.clone();
-        for (binding, words) in case.kernel.bindings.iter().zip(&mut dirty) {
+        for (binding, words) in case.kernel.interface.bindings.iter().zip(&mut dirty) {
             if case.overwritten.contains(&binding.name) {
                 words.iter_mut().enumerate().for_each(|(i, w)| *w = 0x4b1d_0000 ^ i as u32);
             }
@@ -53,7 +56,7 @@ pub async fn check_cases(
         let again = run_words_async(engine, case.kernel, &case.params, &dirty, case.workgroups)
             .await
             .map_err(failed)?;
-        for (i, binding) in case.kernel.bindings.iter().enumerate() {
+        for (i, binding) in case.kernel.interface.bindings.iter().enumerate() {
             if again[i] != found[i] {
                 return Err(format!("{name:?}: {} depends on what was there", binding.name));
             }
@@ -93,19 +96,17 @@ pub async fn short_run(engine: Engine) -> Result<Vec<Pose>, SlamError> {
     // Steps cut short would end wherever rounding sent them.
     config.tracking.render_rays = 1024;
     config.tracking.render_iterations = 12;
-    let info = sequence.info().clone();
-    let mut slam = Slam::new(engine, config, &info).await?;
-    for index in 0..info.frames {
-        let frame = sequence.frame(index).map_err(|e| SlamError::Frame {
+    let mut run = Run::new(engine, config, sequence.info()).await?;
+    run.to_end(&mut sequence, &mut ()).await.map_err(|error| match error {
+        RunError::Input { index, error } => SlamError::Frame {
             frame: index,
             field: "built-in sequence",
-            found: e.to_string(),
+            found: error.to_string(),
             expected: "a frame".into(),
-        })?;
-        slam.process(&frame).await?;
-    }
-    slam.finish().await?;
-    Ok(slam.trajectory().iter().map(|p| p.world_from_camera).collect())
+        },
+        RunError::Frame { error, .. } | RunError::Finish(error) | RunError::Resume(error) => error,
+    })?;
+    Ok(run.slam().trajectory().iter().map(|p| p.world_from_camera).collect())
 }
 
 /// Largest distance between the positions of two runs \[m\]; infinite for unequal lengths.

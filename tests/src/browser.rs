@@ -16,11 +16,7 @@ pub struct Reference(Recorded);
 async fn engine(kind: &str) -> Result<Engine, JsError> {
     match kind {
         "cpu" => Ok(Engine::cpu()),
-        // Unrolled shaders take seconds each to compile on a software adapter.
-        _ => {
-            let overrides = vec![("UNROLL", 0)];
-            Ok(Engine::gpu(GpuOptions { overrides, ..GpuOptions::default() }).await?)
-        }
+        _ => Ok(Engine::gpu(GpuOptions::default()).await?),
     }
 }
 
@@ -39,7 +35,7 @@ impl Reference {
 
     /// Names of the kernels.
     pub fn kernels(&self) -> Vec<String> {
-        kernels::all().iter().map(|kernel| kernel.name.into()).collect()
+        kernels::all().iter().map(|kernel| kernel.interface.name.into()).collect()
     }
 
     /// Number of cases of a kernel. (That every kernel has one is a native test's business.)

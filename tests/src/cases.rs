@@ -1,14 +1,16 @@
 //! Inputs of every kernel, made by the twins of the kernels before it, so that a mistake of one
 //! shader does not hide or excuse another's.
 use crate::{
-    Compare, TestRandom, anchors, f32_words,
+    Compare, TestRandom, anchors,
+    case::{Case, SUMS},
+    f32_words,
     fixture::{self, CLASSES, FRAMES, Options, POISON, State, words, workgroups},
     samples, tokens,
 };
 use mte_slam_core::{
     engine::Engine,
+    kernel::Kernel,
     kernels::{
-        Kernel,
         adam::{ADAM, AdamParams},
         align_points::{ALIGN_POINTS, ALIGN_ROW},
         composite::COMPOSITE,
@@ -35,30 +37,8 @@ use mte_slam_core::{
         STATE_COLOR_HIDDEN_DELTA, STATE_FEATURE, STATE_FEATURE_DELTA, STATE_SEMANTIC,
         STATE_SEMANTIC_HIDDEN, STATE_SEMANTIC_HIDDEN_DELTA,
     },
+    shaders::decoders::{COLOR, Layer, SEMANTIC},
 };
-
-/// One run of a kernel.
-pub struct Case {
-    /// What is special about it.
-    pub name: &'static str,
-    /// The kernel.
-    pub kernel: &'static Kernel,
-    /// Words of its parameters.
-    pub params: Vec<u32>,
-    /// Buffers in binding order.
-    pub buffers: Vec<Vec<u32>>,
-    /// Workgroups.
-    pub workgroups: [u32; 3],
-    /// How each binding may differ between engines.
-    pub tolerance: Vec<Compare>,
-    /// Bindings that the kernel overwrites completely.
-    pub overwritten: Vec<&'static str>,
-}
-
-/// How far the engines may be apart. Both compute in f32 with another order of sums and another
-/// exp, so: a few units of the last place (6e-8) times the number of terms behind a result
-/// (32 to 64 in a layer, three layers), relative to the largest value of the column.
-pub(crate) const SUMS: f32 = 2e-5;
 
 fn tolerance(name: &str) -> Compare {
     let columns = |row, bits, relative| Compare::Columns { row, bits, relative };
@@ -97,7 +77,12 @@ fn case(
         params: words(&state.params),
         buffers: state.inputs(kernel),
         workgroups: workgroups(kernel, &state.params),
-        tolerance: kernel.bindings.iter().map(|binding| tolerance(binding.name)).collect(),
+        tolerance: kernel
+            .interface
+            .bindings
+            .iter()
+            .map(|binding| tolerance(binding.name))
+            .collect(),
         overwritten: overwritten.to_vec(),
     }
 }
@@ -120,10 +105,10 @@ fn before(kernel: &Kernel, o: &Options) -> State {
     let mut state = State::new(o);
     let mut engine = Engine::cpu();
     for step in chain {
-        if step.name == kernel.name {
+        if step.interface.name == kernel.interface.name {
             break;
         }
-        if step.name != MASK_RAYS.name || o.flags & FLAG_MASK != 0 {
+        if step.interface.name != MASK_RAYS.interface.name || o.flags & FLAG_MASK != 0 {
             state.run(&mut engine, step);
         }
     }
@@ -350,29 +335,34 @@ fn geometry_weights(o: &Options) -> Vec<Case> {
 
 /// The five layers of the per-ray decoders, as [`mte_slam_core::map::passes`] run them.
 pub fn weight_layers(rays: u32, classes: u32, chunk: u32, row: u32) -> Vec<WeightGradientParams> {
-    let head = HEAD_FLOATS as u32 - GEOMETRY_FLOATS as u32;
+    let head = Layer {
+        inputs: FEATURE,
+        outputs: classes as usize,
+        weights: HEAD_FLOATS,
+        bias: HEAD_FLOATS + FEATURE * classes as usize,
+    };
     [
-        (32, 32, STATE_APPEARANCE, STATE_COLOR_HIDDEN_DELTA, 0, 1024),
-        (32, 4, STATE_COLOR_HIDDEN, STATE_COLOR_DELTA, 1056, 1184),
-        (32, 32, STATE_SEMANTIC, STATE_SEMANTIC_HIDDEN_DELTA, 1188, 2212),
-        (32, 16, STATE_SEMANTIC_HIDDEN, STATE_FEATURE_DELTA, 2244, 2756),
-        (16, classes, STATE_FEATURE, 0, head, head + classes * 16),
+        (COLOR[0], STATE_APPEARANCE, STATE_COLOR_HIDDEN_DELTA),
+        (COLOR[1], STATE_COLOR_HIDDEN, STATE_COLOR_DELTA),
+        (SEMANTIC[0], STATE_SEMANTIC, STATE_SEMANTIC_HIDDEN_DELTA),
+        (SEMANTIC[1], STATE_SEMANTIC_HIDDEN, STATE_FEATURE_DELTA),
+        (head, STATE_FEATURE, 0),
     ]
     .iter()
     .enumerate()
-    .map(|(i, (inputs, outputs, x, d, weight_offset, bias_offset))| WeightGradientParams {
+    .map(|(i, (layer, x, d))| WeightGradientParams {
         rays,
-        inputs: *inputs,
-        outputs: *outputs,
+        inputs: layer.inputs as u32,
+        outputs: layer.outputs as u32,
         chunk,
         input_offset: x * 4,
         delta_offset: d * 4,
         from_logits: u32::from(i == 4),
         row,
-        weight_offset: *weight_offset,
-        bias_offset: *bias_offset,
+        weight_offset: (layer.weights - GEOMETRY_FLOATS) as u32,
+        bias_offset: (layer.bias - GEOMETRY_FLOATS) as u32,
         // The class head is stored output-major.
-        input_stride: if i == 4 { 1 } else { *outputs },
+        input_stride: if i == 4 { 1 } else { layer.outputs as u32 },
         output_stride: if i == 4 { 16 } else { 1 },
     })
     .collect()

@@ -4,16 +4,18 @@ use crate::{TestRandom, f32_words};
 use bytemuck::Zeroable;
 use glam::DVec3;
 use mte_slam_core::{
+    commands::{Command, Commands, workgroups_1d},
     config::FieldConfig,
     engine::{Engine, EngineError},
     field::{FieldShape, initial_decoders},
+    kernel::Kernel,
     kernels::{
-        self, Kernel,
+        self,
         shared::{FLAG_GUIDED, FLAG_MAP, FLAG_MASK, FLAG_POSE, RAY_WORDS},
     },
     layout::{BACKWARD_STRIP, FieldParams, RAY_OUT_FLOATS, RAY_STATE_FLOATS},
     map::pose_words,
-    recording::{Command, Recording, workgroups_1d},
+    shaders::decoders::GEOMETRY,
 };
 use mte_slam_types::{
     camera::Camera,
@@ -227,8 +229,8 @@ pub fn decoders(classes: u32) -> Vec<f32> {
     let mut random = TestRandom(31);
     let mut w = initial_decoders(classes, 5);
     w.iter_mut().filter(|x| **x == 0.0).for_each(|x| *x = random.uniform(-0.1, 0.1));
-    w[800..816].iter_mut().for_each(|x| *x *= 3.0);
-    w[816] = -0.4;
+    w[GEOMETRY[2].weight_range()].iter_mut().for_each(|x| *x *= 3.0);
+    w[GEOMETRY[2].bias] = -0.4;
     w
 }
 
@@ -300,7 +302,7 @@ impl State {
 
     /// Copies of a kernel's buffers.
     pub fn inputs(&self, kernel: &Kernel) -> Vec<Vec<u32>> {
-        kernel.bindings.iter().map(|binding| self.buffers[binding.name].clone()).collect()
+        kernel.interface.bindings.iter().map(|binding| self.buffers[binding.name].clone()).collect()
     }
 
     /// Runs a field kernel and keeps what it wrote.
@@ -308,7 +310,7 @@ impl State {
         let groups = workgroups(kernel, &self.params);
         let outputs =
             run_words(engine, kernel, &words(&self.params), &self.inputs(kernel), groups).unwrap();
-        for (binding, data) in kernel.bindings.iter().zip(outputs) {
+        for (binding, data) in kernel.interface.bindings.iter().zip(outputs) {
             self.buffers.insert(binding.name, data);
         }
     }
@@ -356,7 +358,7 @@ impl State {
 /// Workgroups that a field kernel needs for a batch, as the device dispatches it.
 pub fn workgroups(kernel: &Kernel, p: &FieldParams) -> [u32; 3] {
     let (rays, samples) = (p.rays as usize, (p.rays * p.samples) as usize);
-    let invocations = match kernel.name {
+    let invocations = match kernel.interface.name {
         "geometry_forward" => samples,
         "geometry_backward" => samples.div_ceil(BACKWARD_STRIP as usize),
         "scatter_geometry" => rays * 24,
@@ -364,7 +366,7 @@ pub fn workgroups(kernel: &Kernel, p: &FieldParams) -> [u32; 3] {
         "mask_rays" => 1,
         _ => rays,
     };
-    workgroups_1d(invocations, kernel.workgroup_size)
+    workgroups_1d(invocations, kernel.interface.workgroup_size)
 }
 
 /// The words of a parameter struct.
@@ -391,16 +393,16 @@ pub async fn run_words_async(
     buffers: &[Vec<u32>],
     workgroups: [u32; 3],
 ) -> Result<Vec<Vec<u32>>, EngineError> {
-    let mut recording = Recording::new();
+    let mut commands = Commands::new();
     let mut ids = Vec::new();
-    for (binding, data) in kernel.bindings.iter().zip(buffers) {
+    for (binding, data) in kernel.interface.bindings.iter().zip(buffers) {
         let id = engine.create_buffer(binding.name, data.len())?;
-        recording.upload(id, 0, data);
+        commands.upload(id, 0, data);
         ids.push(id);
     }
     let (bindings, params) = (ids.clone(), params.to_vec());
-    recording.commands.push(Command::Dispatch { kernel, bindings, params, workgroups });
-    let mut outcome = engine.submit(&recording).map(|()| Vec::new());
+    commands.list.push(Command::Dispatch { kernel, bindings, params, workgroups });
+    let mut outcome = engine.submit(&commands).map(|()| Vec::new());
     for (id, data) in ids.iter().zip(buffers) {
         if let Ok(all) = &mut outcome {
             match engine.read(*id, 0, data.len()).await {

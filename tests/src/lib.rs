@@ -5,6 +5,7 @@ pub mod anchors;
 pub mod body;
 #[cfg(target_arch = "wasm32")]
 pub mod browser;
+pub mod case;
 pub mod cases;
 pub mod fixture;
 pub mod recorded;
@@ -14,11 +15,10 @@ pub mod tokens;
 
 use bytemuck::Pod;
 use mte_slam_core::{
+    commands::Commands,
     engine::{Engine, EngineError, GpuOptions},
-    kernels::Kernel,
+    kernel::Kernel,
     layout::NO_DISTANCE,
-    recording::Recording,
-    shader,
 };
 use pollster::block_on;
 
@@ -125,16 +125,16 @@ pub fn run_kernel<P: Pod>(
     buffers: &[Vec<u32>],
     workgroups: [u32; 3],
 ) -> Result<Vec<Vec<u32>>, EngineError> {
-    let mut recording = Recording::new();
+    let mut commands = Commands::new();
     let mut ids = Vec::new();
     for (i, words) in buffers.iter().enumerate() {
-        let name = kernel.bindings.get(i).map_or("surplus", |binding| binding.name);
+        let name = kernel.interface.bindings.get(i).map_or("surplus", |binding| binding.name);
         let id = engine.create_buffer(name, words.len())?;
-        recording.upload(id, 0, words);
+        commands.upload(id, 0, words);
         ids.push(id);
     }
-    recording.dispatch(kernel, params, &ids, workgroups);
-    let outcome = engine.submit(&recording).and_then(|()| {
+    commands.dispatch(kernel, params, &ids, workgroups);
+    let outcome = engine.submit(&commands).and_then(|()| {
         ids.iter()
             .zip(buffers)
             .map(|(id, words)| block_on(engine.read(*id, 0, words.len())))
@@ -145,8 +145,7 @@ pub fn run_kernel<P: Pod>(
 }
 
 /// Runs a kernel on the CPU and on the GPU engine from identical buffers and compares every
-/// buffer. Where the shader differs between `UNROLL` 0 and 1, both are run. Without an adapter
-/// this prints a line and is satisfied.
+/// buffer. Without an adapter this prints a line and is satisfied.
 pub fn compare_kernel<P: Pod>(
     kernel: &'static Kernel,
     params: &P,
@@ -155,17 +154,9 @@ pub fn compare_kernel<P: Pod>(
     tolerance: &Tolerance,
 ) -> Result<(), Mismatch> {
     let expected = run_kernel(&mut Engine::cpu(), kernel, params, buffers, workgroups)?;
-    let source = |unroll| shader::compose(kernel, &[("UNROLL", unroll)]).map_err(EngineError::from);
-    let variants: &[u32] = if source(0)? == source(1)? { &[1] } else { &[1, 0] };
-    for unroll in variants {
-        let overrides = vec![("UNROLL", *unroll)];
-        let Some(mut gpu) = gpu_engine_with(GpuOptions { overrides, ..Default::default() }) else {
-            return Ok(());
-        };
-        let found = run_kernel(&mut gpu, kernel, params, buffers, workgroups)?;
-        compare_outputs(kernel, &expected, &found, tolerance)?;
-    }
-    Ok(())
+    let Some(mut gpu) = gpu_engine() else { return Ok(()) };
+    let found = run_kernel(&mut gpu, kernel, params, buffers, workgroups)?;
+    compare_outputs(kernel, &expected, &found, tolerance)
 }
 
 /// Compares two engines' buffers.
@@ -175,7 +166,7 @@ pub fn compare_outputs(
     found: &[Vec<u32>],
     tolerance: &Tolerance,
 ) -> Result<(), Mismatch> {
-    let bindings = kernel.bindings.len();
+    let bindings = kernel.interface.bindings.len();
     if [expected.len(), found.len(), tolerance.0.len()].iter().any(|n| *n != bindings) {
         let tolerances = tolerance.0.len();
         return Err(Mismatch::Count { expected: bindings, buffers: found.len(), tolerances });
@@ -196,8 +187,8 @@ pub fn compare_outputs(
         let count = pairs().filter(|(index, pair)| differs(*index, *pair)).count();
         if let Some((index, (a, b))) = first {
             return Err(Mismatch::Word {
-                kernel: kernel.name,
-                binding: kernel.bindings[i].name,
+                kernel: kernel.interface.name,
+                binding: kernel.interface.bindings[i].name,
                 index,
                 expected: show(*compare, *a),
                 found: show(*compare, *b),

@@ -1,8 +1,9 @@
 //! Inputs and results of all cases, and the poses of a short run, as bytes: what one world found,
 //! for another to compare with.
 use crate::{
-    body,
-    cases::{Case, cases},
+    body::{self, Outcome},
+    case::Case,
+    cases::cases,
 };
 use mte_slam_core::{
     engine::{Engine, EngineError},
@@ -11,9 +12,6 @@ use mte_slam_core::{
 };
 use mte_slam_types::pose::Pose;
 use pollster::block_on;
-
-/// All buffers after a case.
-pub type Outcome = Vec<Vec<u32>>;
 
 /// See the module.
 pub struct Recorded {
@@ -32,7 +30,7 @@ impl Recorded {
     /// When the CPU engine fails: there is nothing to compare with then.
     pub fn make() -> Recorded {
         let kernels = kernels::all().iter().map(|kernel| {
-            let cases = cases(kernel.name);
+            let cases = cases(kernel.interface.name);
             let mut engine = Engine::cpu();
             let run = |case: &Case| block_on(body::run_case(&mut engine, case));
             let results: Result<Vec<_>, EngineError> = cases.iter().map(run).collect();
@@ -83,7 +81,7 @@ impl Recorded {
         let mut all = Vec::new();
         for kernel in kernels::all() {
             // Names, tolerances and sizes are this program's; inputs and results are the other's.
-            let mut cases = cases(kernel.name);
+            let mut cases = cases(kernel.interface.name);
             if take(1)?[0] as usize != cases.len() {
                 return None;
             }
@@ -96,7 +94,7 @@ impl Recorded {
                     *buffer = take(n)?.to_vec();
                 }
                 let mut result = Vec::new();
-                for _ in kernel.bindings {
+                for _ in kernel.interface.bindings {
                     let n = take(1)?[0] as usize;
                     result.push(take(n)?.to_vec());
                 }

@@ -1,18 +1,15 @@
 //! A map on an engine, without a run around it: what tests of passes and gradients drive.
+use crate::fixture::{CLASSES, DEPTH_UNIT_M};
 use mte_slam_core::{
-    camera::Camera,
+    commands::{Buffer, BufferId, Commands},
     config::Config,
     engine::Engine,
     field::FieldShape,
-    frame::Frame,
     map::{AnchorCounts, Batch, FrameFormat, Map, Rates, Scratch, fusion, passes, suppressor},
-    pose::Pose,
-    recording::{BufferId, Recording},
 };
+use mte_slam_types::{camera::Camera, frame::Frame, pose::Pose};
 use pollster::block_on;
 use std::ops::Deref;
-
-use crate::fixture::{CLASSES, DEPTH_UNIT_M};
 
 /// An engine, a map and its scratch buffers. Reads as the map.
 pub struct Rig {
@@ -53,61 +50,61 @@ impl Rig {
     }
 
     /// Runs what is recorded.
-    pub fn submit(&mut self, r: &Recording) {
+    pub fn submit(&mut self, r: &Commands) {
         self.engine.submit(r).unwrap();
     }
 
     /// Floats of a buffer.
-    pub fn read(&mut self, buffer: BufferId, floats: usize) -> Vec<f32> {
+    pub fn read(&mut self, buffer: impl Into<BufferId>, floats: usize) -> Vec<f32> {
         block_on(self.engine.read_as(buffer, 0, floats)).unwrap()
     }
 
     /// Words of a buffer.
-    pub fn read_words(&mut self, buffer: BufferId, words: usize) -> Vec<u32> {
+    pub fn read_words(&mut self, buffer: impl Into<BufferId>, words: usize) -> Vec<u32> {
         block_on(self.engine.read(buffer, 0, words)).unwrap()
     }
 
     /// Replaces the beginning of a buffer.
-    pub fn write(&mut self, buffer: BufferId, values: &[f32]) {
-        let mut r = Recording::new();
+    pub fn write(&mut self, buffer: impl Into<BufferId>, values: &[f32]) {
+        let mut r = Commands::new();
         r.upload(buffer, 0, values);
         self.submit(&r);
     }
 
     /// As [`mte_slam_core::map::FrameSlots::upload_frame`].
-    pub fn upload_frame(&self, r: &mut Recording, slot: u32, frame: &Frame) {
+    pub fn upload_frame(&self, r: &mut Commands, slot: u32, frame: &Frame) {
         self.map.frames.upload_frame(r, slot, frame);
     }
 
     /// As [`mte_slam_core::map::FrameSlots::upload_color`].
-    pub fn upload_color(&self, r: &mut Recording, slot: u32, image: &[[u8; 4]]) {
+    pub fn upload_color(&self, r: &mut Commands, slot: u32, image: &[[u8; 4]]) {
         self.map.frames.upload_color(r, slot, image);
     }
 
     /// As [`mte_slam_core::map::FrameSlots::upload_pose`].
-    pub fn upload_pose(&self, r: &mut Recording, slot: u32, pose: &Pose) {
+    pub fn upload_pose(&self, r: &mut Commands, slot: u32, pose: &Pose) {
         self.map.frames.upload_pose(r, slot, pose);
     }
 
     /// As [`Scratch::upload_window`].
-    pub fn upload_window(&self, r: &mut Recording, window: &[(u32, bool)]) {
+    pub fn upload_window(&self, r: &mut Commands, window: &[(u32, bool)]) {
         self.scratch.upload_window(r, window);
     }
 
     /// As [`passes::record_forward`].
-    pub fn record_forward(&self, r: &mut Recording, b: &Batch<'_>) {
+    pub fn record_forward(&self, r: &mut Commands, b: &Batch<'_>) {
         passes::record_forward(r, &self.map, &self.scratch, b);
     }
 
     /// As [`passes::record_backward`].
-    pub fn record_backward(&self, r: &mut Recording, b: &Batch<'_>) {
+    pub fn record_backward(&self, r: &mut Commands, b: &Batch<'_>) {
         passes::record_backward(r, &self.map, &self.scratch, b);
     }
 
     /// As [`passes::record_pose_step`], with the rates of translation \[m\] and rotation \[rad\].
     pub fn record_pose_step(
         &self,
-        r: &mut Recording,
+        r: &mut Commands,
         b: &Batch<'_>,
         rates: [f64; 2],
         restart: bool,
@@ -118,37 +115,37 @@ impl Rig {
     }
 
     /// As [`passes::record_step`].
-    pub fn record_step(&mut self, r: &mut Recording, b: &Batch<'_>, rates: Rates) {
+    pub fn record_step(&mut self, r: &mut Commands, b: &Batch<'_>, rates: Rates) {
         passes::record_step(r, &mut self.map, &self.scratch, b, rates);
     }
 
     /// As [`fusion::record_forward`].
-    pub fn record_fusion_forward(&self, r: &mut Recording, slot: u32) {
+    pub fn record_fusion_forward(&self, r: &mut Commands, slot: u32) {
         fusion::record_forward(r, &self.map, &self.scratch, slot);
     }
 
     /// As [`fusion::record_backward`].
-    pub fn record_fusion_backward(&self, r: &mut Recording, slot: u32) {
+    pub fn record_fusion_backward(&self, r: &mut Commands, slot: u32) {
         fusion::record_backward(r, &self.map, &self.scratch, slot);
     }
 
     /// As [`fusion::record_step`].
-    pub fn record_fusion_step(&mut self, r: &mut Recording, slot: u32, rate_head: f64) {
+    pub fn record_fusion_step(&mut self, r: &mut Commands, slot: u32, rate_head: f64) {
         fusion::record_step(r, &mut self.map, &self.scratch, slot, rate_head);
     }
 
     /// As [`suppressor::record_update`].
-    pub fn record_anchor_update(&self, r: &mut Recording, b: &Batch<'_>) {
+    pub fn record_anchor_update(&self, r: &mut Commands, b: &Batch<'_>) {
         suppressor::record_update(r, &self.map, &self.scratch, b);
     }
 
     /// As [`suppressor::record_maintenance`].
-    pub fn record_anchor_maintenance(&self, r: &mut Recording, b: &Batch<'_>) {
+    pub fn record_anchor_maintenance(&self, r: &mut Commands, b: &Batch<'_>) {
         suppressor::record_maintenance(r, &self.map, &self.scratch, b);
     }
 
     /// As [`suppressor::record_settling`].
-    pub fn record_anchor_settling(&self, r: &mut Recording, b: &Batch<'_>, rate: f64, begin: bool) {
+    pub fn record_anchor_settling(&self, r: &mut Commands, b: &Batch<'_>, rate: f64, begin: bool) {
         suppressor::record_settling(r, &self.map, &self.scratch, b, rate, begin);
     }
 
@@ -183,7 +180,7 @@ impl Rig {
     }
 
     /// Buffer of the fusion's activations, floats per token, number of tokens.
-    pub fn tokens(&self) -> (BufferId, usize, usize) {
+    pub fn tokens(&self) -> (Buffer<f32>, usize, usize) {
         let f = self.map.fusion.as_ref().unwrap();
         (self.scratch.fusion.as_ref().unwrap().tokens, f.stride as usize, f.count())
     }

@@ -1,11 +1,12 @@
 //! Cases of the kernels of the per-sample class head.
 use crate::{
     Compare, TestRandom,
-    cases::{Case, SUMS},
+    case::{Case, SUMS},
     f32_words,
     fixture::{CLASSES, Options, POISON, State, words},
 };
 use mte_slam_core::{
+    commands::workgroups_1d,
     engine::Engine,
     kernels::{
         composite::COMPOSITE,
@@ -18,7 +19,6 @@ use mte_slam_core::{
         shared::FLAG_DENSE,
     },
     layout::RAY_OUT_FLOATS,
-    recording::workgroups_1d,
 };
 
 pub(crate) fn cases(kernel: &str) -> Option<Vec<Case>> {
@@ -140,7 +140,7 @@ fn features(name: &'static str, o: &Options, slots: u32) -> Case {
         kernel: &SAMPLE_FEATURES,
         params: words(&state.params),
         buffers: state.inputs(&SAMPLE_FEATURES),
-        workgroups: workgroups_1d(n, SAMPLE_FEATURES.workgroup_size),
+        workgroups: workgroups_1d(n, SAMPLE_FEATURES.interface.workgroup_size),
         tolerance: [[unchanged; 4].as_slice(), &[columns(32), columns(1), columns(1)]].concat(),
         overwritten: vec!["features", "slot_depths", "slot_weights"],
     }

@@ -3,14 +3,15 @@
 //! workgroup's tokens.
 use crate::{
     Compare, TestRandom,
-    cases::{Case, SUMS},
+    case::{Case, SUMS},
     f32_words, fixture,
     fixture::{CLASSES, Options, POISON, State, words},
 };
 use mte_slam_core::{
+    commands::workgroups_1d,
     engine::Engine,
+    kernel::Kernel,
     kernels::{
-        Kernel,
         attend_keys::ATTEND_KEYS,
         attend_queries::ATTEND_QUERIES,
         attend_tokens::ATTEND_TOKENS,
@@ -30,7 +31,6 @@ use mte_slam_core::{
         },
     },
     layout::TARGET_FLOATS,
-    recording::workgroups_1d,
 };
 
 /// Parameters of a grid, without a layer.
@@ -78,7 +78,7 @@ fn tolerance(p: &TokenParams, kernel: &Kernel) -> Vec<Compare> {
         },
         _ => Compare::U32,
     };
-    kernel.bindings.iter().map(|binding| one(binding.name)).collect()
+    kernel.interface.bindings.iter().map(|binding| one(binding.name)).collect()
 }
 
 fn token_case(
@@ -93,7 +93,7 @@ fn token_case(
         kernel,
         params: words(p),
         buffers,
-        workgroups: workgroups_1d(invocations, kernel.workgroup_size),
+        workgroups: workgroups_1d(invocations, kernel.interface.workgroup_size),
         tolerance: tolerance(p, kernel),
         overwritten: Vec::new(),
     }

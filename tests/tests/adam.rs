@@ -1,8 +1,8 @@
 //! The Adam kernel: shader against twin, twin against a plain f64 computation.
 use mte_slam_core::{
+    commands::workgroups_1d,
     engine::Engine,
     kernels::adam::{ADAM, AdamParams, STATUS_NOT_FINITE, STATUS_SATURATED},
-    recording::workgroups_1d,
 };
 use mte_slam_tests::{
     Compare, Mismatch, TestRandom, Tolerance, compare_kernel, compare_outputs, f32_words,
@@ -60,7 +60,7 @@ fn buffers(fixed_point: u32) -> Vec<Vec<u32>> {
 #[test]
 fn shader_and_twin_agree() {
     for fixed_point in [0, 1] {
-        let workgroups = workgroups_1d(N, ADAM.workgroup_size);
+        let workgroups = workgroups_1d(N, ADAM.interface.workgroup_size);
         compare_kernel(
             &ADAM,
             &params(3, fixed_point),
@@ -80,7 +80,7 @@ fn any_number_of_workgroups_gives_the_same() {
         let mut run = |workgroups| {
             run_kernel(&mut engine, &ADAM, &params(2, 0), &buffers(0), workgroups).unwrap()
         };
-        let expected = run(workgroups_1d(N, ADAM.workgroup_size));
+        let expected = run(workgroups_1d(N, ADAM.interface.workgroup_size));
         for workgroups in [[1, 1, 1], [3, 2, 1], [200, 1, 1]] {
             assert!(run(workgroups) == expected, "{workgroups:?}");
         }
@@ -89,17 +89,17 @@ fn any_number_of_workgroups_gives_the_same() {
 
 #[test]
 fn a_perturbed_result_is_caught() {
-    let workgroups = workgroups_1d(N, ADAM.workgroup_size);
+    let workgroups = workgroups_1d(N, ADAM.interface.workgroup_size);
     let input = buffers(1);
     let good = run_kernel(&mut Engine::cpu(), &ADAM, &params(3, 1), &input, workgroups).unwrap();
     compare_outputs(&ADAM, &good, &good, &tolerance()).unwrap();
-    for binding in 0..ADAM.bindings.len() {
+    for binding in 0..ADAM.interface.bindings.len() {
         let mut bad = good.clone();
         let index = bad[binding].len() / 2;
         bad[binding][index] ^= 1 << 20;
         match compare_outputs(&ADAM, &good, &bad, &tolerance()) {
             Err(Mismatch::Word { binding: name, index: at, count: 1, .. }) => {
-                assert_eq!((name, at), (ADAM.bindings[binding].name, index));
+                assert_eq!((name, at), (ADAM.interface.bindings[binding].name, index));
             }
             other => panic!("binding {binding}: {other:?}"),
         }
@@ -140,7 +140,7 @@ fn several_steps_follow_textbook_adam() {
                 x[i] -= 0.01 * mh / (vh.sqrt() + 1e-15);
             }
             state[1] = i32_words(gradient);
-            let workgroups = workgroups_1d(N, ADAM.workgroup_size);
+            let workgroups = workgroups_1d(N, ADAM.interface.workgroup_size);
             state = run_kernel(&mut engine, &ADAM, &p, &state, workgroups).unwrap();
         }
         assert!(state[1][5..N - 4].iter().all(|g| *g == 0), "used gradients are cleared");
@@ -156,7 +156,7 @@ fn several_steps_follow_textbook_adam() {
 fn bad_gradients_are_skipped_and_reported() {
     for (fixed_point, bit) in [(0, STATUS_NOT_FINITE), (1, STATUS_SATURATED)] {
         let before = buffers(fixed_point);
-        let workgroups = workgroups_1d(N, ADAM.workgroup_size);
+        let workgroups = workgroups_1d(N, ADAM.interface.workgroup_size);
         let mut cpu = Engine::cpu();
         let after =
             run_kernel(&mut cpu, &ADAM, &params(1, fixed_point), &before, workgroups).unwrap();

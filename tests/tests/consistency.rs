@@ -1,6 +1,6 @@
 //! Every kernel's shader against its twin, from identical inputs.
 use mte_slam_core::{
-    engine::{Engine, GpuOptions},
+    engine::Engine,
     field::decoder_floats,
     kernels::{
         self,
@@ -9,18 +9,18 @@ use mte_slam_core::{
     },
     layout::{
         ANCHOR_FLOATS, GEOMETRY_FLOATS, NO_ANCHOR, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_ANCHOR,
-        STATE_POSE,
+        STATE_POSE, SURFACE_FLOATS,
     },
-    shader,
 };
 use mte_slam_tests::{
     Compare, Mismatch, Tolerance,
     anchors::maintenance,
     body::{TRAJECTORY_TOLERANCE_M, check_cases, largest_gap_m, short_run},
-    cases::{Case, cases, supervised, weight_layers},
+    case::Case,
+    cases::{cases, supervised, weight_layers},
     compare_outputs,
     fixture::{CLASSES, Options, POISON, State, run_words, words},
-    gpu_engine, gpu_engine_with,
+    gpu_engine,
     recorded::Recorded,
     samples,
 };
@@ -31,20 +31,14 @@ fn run(engine: &mut Engine, case: &Case, buffers: &[Vec<u32>]) -> Vec<Vec<u32>> 
         .unwrap_or_else(|error| panic!("{}: {error}", case.name))
 }
 
-/// Both engines on every case of a kernel, the GPU's with loops unrolled and not; then each
-/// engine from another garbage in the buffers that the kernel overwrites.
+/// Both engines on every case of a kernel, then each engine from another garbage in the buffers that the kernel overwrites.
 fn check(kernel: &str) {
     let cases = cases(kernel);
     assert!(!cases.is_empty(), "{kernel} has no case");
     let expected: Vec<_> =
         cases.iter().map(|case| run(&mut Engine::cpu(), case, &case.buffers)).collect();
     let mut engines = vec![Engine::cpu()];
-    let source = |unroll| shader::compose(cases[0].kernel, &[("UNROLL", unroll)]).unwrap();
-    let variants: &[u32] = if source(0) == source(1) { &[1] } else { &[1, 0] };
-    for unroll in variants {
-        let overrides = vec![("UNROLL", *unroll)];
-        engines.extend(gpu_engine_with(GpuOptions { overrides, ..Default::default() }));
-    }
+    engines.extend(gpu_engine());
     for (which, engine) in engines.iter_mut().enumerate() {
         if let Err(difference) = block_on(check_cases(engine, &cases, &expected)) {
             panic!("engine {which}: {difference}");
@@ -75,7 +69,8 @@ consistency! {
 
 #[test]
 fn every_kernel_is_tested() {
-    let mut registered: Vec<&str> = kernels::all().iter().map(|kernel| kernel.name).collect();
+    let mut registered: Vec<&str> =
+        kernels::all().iter().map(|kernel| kernel.interface.name).collect();
     registered.sort_unstable();
     assert_eq!(registered, TESTED, "a kernel without a consistency test, or the reverse");
 }
@@ -135,7 +130,7 @@ fn anchors_that_settle_keep_their_class() {
 #[test]
 fn a_perturbed_output_is_caught() {
     for kernel in kernels::all() {
-        let case = &cases(kernel.name)[0];
+        let case = &cases(kernel.interface.name)[0];
         let good = run(&mut Engine::cpu(), case, &case.buffers);
         let tolerance = Tolerance(case.tolerance.clone());
         compare_outputs(kernel, &good, &good, &tolerance).unwrap();
@@ -158,10 +153,10 @@ fn a_perturbed_output_is_caught() {
                 Compare::U32 => words[0] ^= 1,
             }
             let found = compare_outputs(kernel, &good, &bad, &tolerance);
-            let name = kernel.bindings[binding].name;
+            let name = kernel.interface.bindings[binding].name;
             match found {
                 Err(Mismatch::Word { binding: b, count: 1, .. }) => assert_eq!(b, name),
-                other => panic!("{} {name}: {other:?}", kernel.name),
+                other => panic!("{} {name}: {other:?}", kernel.interface.name),
             }
         }
         // And a float lost altogether.
@@ -171,7 +166,11 @@ fn a_perturbed_output_is_caught() {
         if let Some(binding) = written {
             let mut bad = good.clone();
             bad[binding][3] = POISON;
-            assert!(compare_outputs(kernel, &good, &bad, &tolerance).is_err(), "{}", kernel.name);
+            assert!(
+                compare_outputs(kernel, &good, &bad, &tolerance).is_err(),
+                "{}",
+                kernel.interface.name
+            );
         }
     }
     // Integers among floats: as a float, another class would be a denormal difference.
@@ -198,7 +197,7 @@ fn the_layers_cover_the_decoders() {
             run_words(&mut Engine::cpu(), &WEIGHT_GRADIENT, &words(&p), &buffers, groups).unwrap();
         after[2].iter().zip(&mut written).for_each(|(w, n)| *n += i32::from(*w != POISON));
     }
-    let used = 2772 + CLASSES as usize * 17;
+    let used = SURFACE_FLOATS + CLASSES as usize * 17;
     assert!(written[..used].iter().all(|n| *n == 1), "{written:?}");
     assert!(written[used..].iter().all(|n| *n == 0), "the rest is padding");
 }

@@ -1,12 +1,12 @@
 //! Twenty iterations of mapping, run again, give the same bytes: no sum depends on the order in
 //! which threads or workgroups run. The same of iterations that train the fusion and move anchors.
 use mte_slam_core::{
+    commands::Commands,
     config::{Config, Head, LossConfig},
     engine::Engine,
     kernels::shared::{FLAG_GUIDED, FLAG_MAP, FLAG_POSE},
     layout::ANCHOR_FLOATS,
     map::{Batch, Rates, SemanticSupervision},
-    recording::Recording,
 };
 use mte_slam_tests::{
     fixture::{self, CLASSES, FRAMES, Options, State},
@@ -35,7 +35,7 @@ fn map_with(engine: Engine, head: Head, iterations: u32) -> Vec<Vec<u32>> {
     config.keyframes.budget_mib = 1;
     let camera = fixture::camera();
     let mut d = Rig::new(engine, &config, camera, 0, fixture::shape());
-    let mut r = Recording::new();
+    let mut r = Commands::new();
     // The map starts as free space, which trains no appearance in 20 iterations: start elsewhere.
     let state = State::new(&Options::default());
     for (tensor, name) in [
@@ -67,7 +67,7 @@ fn map_with(engine: Engine, head: Head, iterations: u32) -> Vec<Vec<u32>> {
             rare_share: 0.0,
             supervision: SemanticSupervision::default(),
         };
-        let mut r = Recording::new();
+        let mut r = Commands::new();
         d.record_forward(&mut r, &batch);
         d.record_backward(&mut r, &batch);
         d.record_pose_step(&mut r, &batch, [1e-3, 1e-3], iteration == 0);
@@ -79,7 +79,7 @@ fn map_with(engine: Engine, head: Head, iterations: u32) -> Vec<Vec<u32>> {
     let mut tensors = vec![d.geometry, d.appearance, d.semantic, d.decoders];
     tensors.extend(d.sample_head.as_ref().map(|h| h.parameters));
     for t in tensors {
-        for buffer in [t.values, t.moment1, t.moment2] {
+        for buffer in [t.values.floats(), t.moment1, t.moment2] {
             out.push(d.read_words(buffer, t.floats));
         }
     }
@@ -159,7 +159,7 @@ fn fuse(engine: Engine) -> Vec<Vec<u32>> {
     (s.spawn_distance, s.merge_distance, s.stable, s.min_importance) = (0.3, 0.25, 1.0, 1.5);
     let camera = fixture::wide_camera();
     let mut d = Rig::new(engine, &config, camera, 0, fixture::shape());
-    let mut r = Recording::new();
+    let mut r = Commands::new();
     let state = State::new(&Options::default());
     for (tensor, name) in [
         (d.geometry, "planes_geometry"),
@@ -205,7 +205,7 @@ fn fuse(engine: Engine) -> Vec<Vec<u32>> {
                 ..SemanticSupervision::default()
             },
         };
-        let mut r = Recording::new();
+        let mut r = Commands::new();
         d.record_fusion_step(&mut r, iteration % FRAMES, 1e-3);
         (0..FRAMES).for_each(|slot| d.record_fusion_forward(&mut r, slot));
         d.record_forward(&mut r, &batch);
@@ -223,13 +223,13 @@ fn fuse(engine: Engine) -> Vec<Vec<u32>> {
     let (anchors, votes, slots) = (s.anchors, s.votes, s.slots() as usize);
     let mut out = Vec::new();
     for t in [d.semantic, d.decoders, parameters] {
-        for buffer in [t.values, t.moment1, t.moment2] {
+        for buffer in [t.values.floats(), t.moment1, t.moment2] {
             out.push(d.read_words(buffer, t.floats));
         }
     }
     for (buffer, words) in [
         (tokens, count * stride),
-        (anchors, slots * ANCHOR_FLOATS),
+        (anchors.floats(), slots * ANCHOR_FLOATS),
         (votes, slots * CLASSES as usize),
     ] {
         out.push(d.read_words(buffer, words));

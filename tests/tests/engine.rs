@@ -1,54 +1,61 @@
 //! What both engines promise: order, zeroed buffers, large dispatches, typed errors.
 use mte_slam_core::{
+    commands::{BufferId, Commands, workgroups_1d},
     engine::{Engine, EngineError, GpuEngine, GpuOptions, MAX_BUFFER_BYTES, list_adapters},
-    kernels::{Access, Binding, CpuDispatch, Kernel, ParamsLayout, add_i32, load_u32, store_u32},
-    params,
-    recording::{BufferId, Recording, workgroups_1d},
+    kernel::{CpuDispatch, Kernel, add_i32, load_u32, store_u32},
+    shaders::{interface::Interface, shared_struct, structs::StructLayout},
 };
 use mte_slam_tests::{TestRandom, gpu_engine, gpu_engine_with};
 use pollster::block_on;
 
-params! {
+/// A kernel that is declared outside of the crates.
+mod affine {
+    use super::{TestParams, affine_twin};
+    use mte_slam_core::{kernel, shaders::interface};
+
+    interface! {
+        /// values\[i\] = values\[i\] * factors\[i % 4\] + source\[0\], and counts the invocations.
+        pub affine {
+            wgsl: "#import shared/dispatch.wgsl
+                #bindings
+                @compute @workgroup_size(WORKGROUP_SIZE)
+                fn main(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>,
+                    @builtin(local_invocation_index) l: u32) {
+                    let i = linear_invocation(w, n, l);
+                    if (i < params.count) {
+                        values[i] = values[i] * params.factors[i % 4u] + source[0];
+                        atomicAdd(&counter[0], 1);
+                    }
+                }",
+            workgroup_size: 64,
+            params: TestParams,
+            bindings: {
+                /// What is added.
+                source: Read<u32>,
+                /// What is changed.
+                values: ReadWrite<u32>,
+                /// Number of invocations that changed something.
+                counter: Atomic<i32>,
+            }
+        }
+    }
+    kernel! { pub static AFFINE = self, affine_twin }
+}
+use affine::{AFFINE, Views};
+
+shared_struct! {
     /// Parameters of the test kernels.
     pub struct TestParams {
         /// A factor by component.
         factors: [u32; 4],
-        /// Words of `target`.
+        /// Words of `values`.
         count: u32,
     }
 }
 
-/// target\[i\] = target\[i\] * factors\[i % 4\] + source\[0\], and counts the invocations.
-static AFFINE: Kernel = Kernel {
-    name: "affine",
-    wgsl: "#import shared/dispatch.wgsl
-        struct Params { factors: vec4<u32>, count: u32 }
-        @group(0) @binding(0) var<uniform> params: Params;
-        @group(0) @binding(1) var<storage, read> source: array<u32>;
-        @group(0) @binding(2) var<storage, read_write> values: array<u32>;
-        @group(0) @binding(3) var<storage, read_write> counter: array<atomic<i32>>;
-        @compute @workgroup_size(WORKGROUP_SIZE)
-        fn main(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>,
-            @builtin(local_invocation_index) l: u32) {
-            let i = linear_invocation(w, n, l);
-            if (i < params.count) {
-                values[i] = values[i] * params.factors[i % 4u] + source[0];
-                atomicAdd(&counter[0], 1);
-            }
-        }",
-    workgroup_size: 64,
-    bindings: &[
-        Binding { name: "source", access: Access::Read },
-        Binding { name: "values", access: Access::ReadWrite },
-        Binding { name: "counter", access: Access::ReadWrite },
-    ],
-    params: &TestParams::LAYOUT,
-    twin: affine,
-};
-
-fn affine(dispatch: &CpuDispatch<'_>) {
+fn affine_twin(dispatch: &CpuDispatch<'_>) {
     let p: TestParams = dispatch.params();
-    let (source, values, counter) = (dispatch.read_u32(0), dispatch.write(1), dispatch.write(2));
+    let Views { source, values, counter } = dispatch.views();
     dispatch.for_each_invocation(|i| {
         if i < p.count as usize {
             let value = load_u32(&values[i]).wrapping_mul(p.factors[i % 4]);
@@ -58,25 +65,24 @@ fn affine(dispatch: &CpuDispatch<'_>) {
     });
 }
 
+/// A kernel without bindings.
+const fn bare(name: &'static str, wgsl: &'static str) -> Interface {
+    const NONE: StructLayout = StructLayout { name: "None", fields: &[], size: 0 };
+    Interface { name, wgsl, workgroup_size: 1, bindings: &[], params: &NONE }
+}
+
 /// A kernel whose shader is not valid.
 static BROKEN: Kernel = Kernel {
-    name: "broken",
-    wgsl: "@compute @workgroup_size(1) fn main() { let x: f32 = 1u; }",
-    workgroup_size: 1,
-    bindings: &[],
-    params: &ParamsLayout { name: "None", fields: &[], size: 0 },
+    interface: &bare(
+        "broken",
+        "#bindings\n@compute @workgroup_size(1) fn main() { let x: f32 = 1u; }",
+    ),
     twin: |_| {},
 };
 
 /// A kernel whose shader has an unknown constant.
-static UNKNOWN: Kernel = Kernel {
-    name: "unknown",
-    wgsl: "const A = ${NOPE};",
-    workgroup_size: 1,
-    bindings: &[],
-    params: &ParamsLayout { name: "None", fields: &[], size: 0 },
-    twin: |_| {},
-};
+static UNKNOWN: Kernel =
+    Kernel { interface: &bare("unknown", "#bindings\nconst A = ${NOPE};"), twin: |_| {} };
 
 /// Runs a test on the CPU engine and, where there is one, on the GPU engine.
 fn on_both(test: impl Fn(&mut Engine)) {
@@ -120,18 +126,18 @@ fn commands_take_effect_in_order() {
         let copied = engine.create_buffer("copied", n).unwrap();
         let counter = engine.create_buffer("counter", 1).unwrap();
         let bound = [source, values, counter];
-        let mut recording = Recording::new();
-        recording.upload(values, 0, &[1u32, 2, 3, 4, 5, 6, 7, 8]);
-        recording.upload(source, 0, &[100u32]);
-        recording.dispatch_1d(&AFFINE, &times(2, n), &bound, n);
+        let mut commands = Commands::new();
+        commands.upload(values, 0, &[1u32, 2, 3, 4, 5, 6, 7, 8]);
+        commands.upload(source, 0, &[100u32]);
+        commands.dispatch_1d(&AFFINE, &times(2, n), &bound, n);
         // These must not overtake the dispatch.
-        recording.upload(source, 0, &[1000u32]);
-        recording.copy(values, 0, copied, 2, 4);
-        recording.clear(values, 0, 2);
-        recording.dispatch_1d(&AFFINE, &times(1, n), &bound, n);
-        recording.dispatch_1d(&AFFINE, &times(1, n), &bound, n);
-        recording.upload(values, 7, &[-1i32]);
-        engine.submit(&recording).unwrap();
+        commands.upload(source, 0, &[1000u32]);
+        commands.copy(values, 0, copied, 2, 4);
+        commands.clear(values, 0, 2);
+        commands.dispatch_1d(&AFFINE, &times(1, n), &bound, n);
+        commands.dispatch_1d(&AFFINE, &times(1, n), &bound, n);
+        commands.upload(values, 7, &[-1i32]);
+        engine.submit(&commands).unwrap();
         assert_eq!(read(engine, copied, 0, n), [0, 0, 102, 104, 106, 112, 0, 0]);
         let expected = [2000, 2000, 2106, (112 * 2 + 1000) * 2 + 1000, 2110, 2112, 2114, u32::MAX];
         assert_eq!(read(engine, values, 0, n), expected);
@@ -143,21 +149,21 @@ fn commands_take_effect_in_order() {
 }
 
 #[test]
-fn long_recordings_keep_their_order_and_parameters() {
+fn long_lists_keep_their_order_and_parameters() {
     on_both(|engine| {
         let source = engine.create_buffer("source", 1).unwrap();
         let values = engine.create_buffer("values", 4).unwrap();
         let counter = engine.create_buffer("counter", 1).unwrap();
-        let (mut recording, mut random) = (Recording::new(), TestRandom(3));
+        let (mut commands, mut random) = (Commands::new(), TestRandom(3));
         let mut expected = [0u32; 4];
         for i in 0..500u32 {
             let factors = [random.bits(), random.bits(), random.bits(), random.bits()];
             if i % 50 == 7 {
-                recording.upload(source, 0, &[i]);
+                commands.upload(source, 0, &[i]);
             }
             let added = if i < 7 { 0 } else { (i - 7) / 50 * 50 + 7 };
             let params = TestParams { factors, count: 4 };
-            recording.dispatch_1d(&AFFINE, &params, &[source, values, counter], 4);
+            commands.dispatch_1d(&AFFINE, &params, &[source, values, counter], 4);
             for (value, factor) in expected.iter_mut().zip(factors) {
                 *value = value.wrapping_mul(factor).wrapping_add(added);
             }
@@ -167,14 +173,14 @@ fn long_recordings_keep_their_order_and_parameters() {
             if runs == 2 {
                 engine
                     .submit(&{
-                        let mut clear = Recording::new();
+                        let mut clear = Commands::new();
                         clear.clear(values, 0, 4);
                         clear.clear(source, 0, 1);
                         clear
                     })
                     .unwrap();
             }
-            engine.submit(&recording).unwrap();
+            engine.submit(&commands).unwrap();
             assert_eq!(read(engine, values, 0, 4), expected);
             assert_eq!(read(engine, counter, 0, 1), [2000 * runs]);
         }
@@ -189,10 +195,10 @@ fn more_workgroups_than_one_dimension_holds() {
         let source = engine.create_buffer("source", 1).unwrap();
         let values = engine.create_buffer("values", n).unwrap();
         let counter = engine.create_buffer("counter", 1).unwrap();
-        let mut recording = Recording::new();
-        recording.upload(source, 0, &[3u32]);
-        recording.dispatch_1d(&AFFINE, &times(1, n), &[source, values, counter], n);
-        engine.submit(&recording).unwrap();
+        let mut commands = Commands::new();
+        commands.upload(source, 0, &[3u32]);
+        commands.dispatch_1d(&AFFINE, &times(1, n), &[source, values, counter], n);
+        engine.submit(&commands).unwrap();
         assert_eq!(read(engine, counter, 0, 1), [n as u32]);
         assert!(read(engine, values, 0, n).iter().all(|value| *value == 3));
     });
@@ -207,11 +213,11 @@ fn mistakes_are_refused_before_anything_runs() {
         let gone = engine.create_buffer("gone", 8).unwrap();
         engine.destroy_buffer(gone);
         let params = times(1, 8);
-        let mut refuse = |record: &dyn Fn(&mut Recording)| {
-            let mut recording = Recording::new();
-            recording.upload(a, 0, &[7u32]);
-            record(&mut recording);
-            let error = engine.submit(&recording).unwrap_err();
+        let mut refuse = |record: &dyn Fn(&mut Commands)| {
+            let mut commands = Commands::new();
+            commands.upload(a, 0, &[7u32]);
+            record(&mut commands);
+            let error = engine.submit(&commands).unwrap_err();
             assert_eq!(read(engine, a, 0, 1), [0], "{error} came too late");
             error
         };
@@ -241,11 +247,11 @@ fn mistakes_are_refused_before_anything_runs() {
         assert!(matches!(error, EngineError::OutOfRange { operation: "read", .. }));
         assert!(block_on(engine.read_as::<u64>(b, 0, usize::MAX)).is_err());
         // Nothing is recorded for no work, and the engine is still usable.
-        let mut recording = Recording::new();
-        recording.dispatch(&AFFINE, &params, &[a, b, c], [4, 0, 1]);
-        assert!(recording.commands.is_empty());
-        recording.upload(a, 0, &[7u32]);
-        engine.submit(&recording).unwrap();
+        let mut commands = Commands::new();
+        commands.dispatch(&AFFINE, &params, &[a, b, c], [4, 0, 1]);
+        assert!(commands.list.is_empty());
+        commands.upload(a, 0, &[7u32]);
+        engine.submit(&commands).unwrap();
         assert_eq!(read(engine, a, 0, 1), [7]);
     });
 }
@@ -267,13 +273,13 @@ fn too_large_buffers_are_refused_with_numbers() {
 #[test]
 fn broken_shaders_are_typed_errors_and_the_engine_survives() {
     let Some(mut engine) = gpu_engine() else { return };
-    let mut recording = Recording::new();
-    recording.dispatch(&BROKEN, &(), &[], [1, 1, 1]);
-    let error = engine.submit(&recording).unwrap_err();
+    let mut commands = Commands::new();
+    commands.dispatch(&BROKEN, &(), &[], [1, 1, 1]);
+    let error = engine.submit(&commands).unwrap_err();
     assert!(matches!(&error, EngineError::Validation { message } if message.contains("broken")));
-    let mut recording = Recording::new();
-    recording.dispatch(&UNKNOWN, &(), &[], [1, 1, 1]);
-    let error = engine.submit(&recording).unwrap_err();
+    let mut commands = Commands::new();
+    commands.dispatch(&UNKNOWN, &(), &[], [1, 1, 1]);
+    let error = engine.submit(&commands).unwrap_err();
     assert!(error.to_string().contains("unknown.wgsl line 1: unknown name NOPE"), "{error}");
     if let Engine::Gpu(engine) = &mut engine {
         let error = block_on(engine.precompile(&[&AFFINE, &BROKEN])).unwrap_err();
@@ -304,8 +310,8 @@ fn a_wrong_adapter_name_lists_the_adapters() {
 fn unknown_overrides_are_refused() {
     let options = GpuOptions { overrides: vec![("CHANELS", 8)], ..Default::default() };
     let Some(mut engine) = gpu_engine_with(options) else { return };
-    let mut recording = Recording::new();
-    recording.dispatch(&BROKEN, &(), &[], [1, 1, 1]);
-    let error = engine.submit(&recording).unwrap_err();
+    let mut commands = Commands::new();
+    commands.dispatch(&BROKEN, &(), &[], [1, 1, 1]);
+    let error = engine.submit(&commands).unwrap_err();
     assert!(error.to_string().contains("CHANELS"), "{error}");
 }

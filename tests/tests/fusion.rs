@@ -2,17 +2,16 @@
 //! against central differences, where a patch of the image shows up, what the losses move, and
 //! settings that are refused.
 use mte_slam_core::{
+    commands::{BufferId, Commands},
     config::{Config, FusionConfig, LossConfig},
     engine::Engine,
     kernels::{
         shared::{FLAG_ANCHORS, FLAG_DENSE, FLAG_GUIDED, FLAG_MAP},
         tokens::{APPEARANCE_AT, COLOR_AT, NO_BIAS, SEMANTIC_AT},
     },
-    layout::{
-        ANCHOR_FLOATS, GEOMETRY_FLOATS, HEAD_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_ANCHOR,
-    },
+    layout::{ANCHOR_FLOATS, HEAD_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_ANCHOR},
     map::{Batch, ClassWeight, Rates, SemanticSupervision},
-    recording::{BufferId, Recording},
+    shaders::decoders::SEMANTIC,
 };
 use mte_slam_tests::{
     TestRandom, f32_words,
@@ -49,7 +48,7 @@ fn device_with(engine: Engine, fusion: FusionConfig, channels: u32) -> Rig {
     let camera = fixture::wide_camera();
     let (config, shape) = (config(fusion), fixture::shape());
     let mut d = Rig::new(engine, &config, camera, channels, shape);
-    let mut r = Recording::new();
+    let mut r = Commands::new();
     let state = State::new(&Options::default());
     for (tensor, name) in [
         (d.geometry, "planes_geometry"),
@@ -100,7 +99,7 @@ fn feature_map(channels: usize, slot: u32) -> FeatureMap {
 
 /// Mean over the tokens of the loss at F.
 fn fusion_loss(d: &mut Rig) -> f64 {
-    let mut r = Recording::new();
+    let mut r = Commands::new();
     d.record_fusion_backward(&mut r, SLOT);
     d.submit(&r);
     let (tokens, stride, count) = d.tokens();
@@ -113,7 +112,7 @@ fn fusion_loss(d: &mut Rig) -> f64 {
 /// random signs of it, and at single parameters.
 fn check(
     d: &mut Rig,
-    buffer: BufferId,
+    buffer: impl Into<BufferId> + Copy,
     gradient: &[f32],
     part: Range<usize>,
     name: &str,
@@ -231,7 +230,7 @@ fn feature_maps_take_the_place_of_labels() {
         if relabel {
             frame.labels.as_mut().unwrap().fill(1);
         }
-        let mut r = Recording::new();
+        let mut r = Commands::new();
         d.upload_frame(&mut r, SLOT, &frame);
         d.record_fusion_forward(&mut r, SLOT);
         d.submit(&r);
@@ -310,7 +309,7 @@ fn batch(compression: f64, feature: f64) -> Batch<'static> {
 /// A map with anchors (every fourth slot is free) and the fused features of all frames.
 fn supervised() -> Rig {
     let mut d = device(Engine::cpu(), FusionConfig::default());
-    let mut r = Recording::new();
+    let mut r = Commands::new();
     (0..FRAMES).for_each(|slot| d.record_fusion_forward(&mut r, slot));
     let mut random = TestRandom(411);
     let mut anchors = Vec::new();
@@ -326,7 +325,7 @@ fn supervised() -> Rig {
 
 /// The weighted loss against anchors and fused features, mean over the rays.
 fn ray_loss(d: &mut Rig, b: &Batch<'_>) -> f64 {
-    let mut r = Recording::new();
+    let mut r = Commands::new();
     d.record_forward(&mut r, b);
     d.submit(&r);
     let rays = FRAMES * RAYS_PER_FRAME;
@@ -339,7 +338,7 @@ fn ray_loss(d: &mut Rig, b: &Batch<'_>) -> f64 {
 fn head_and_anchors(d: &mut Rig, iteration: u32) -> Vec<(u32, u32)> {
     let mut classes = Vec::new();
     for flags in [FLAG_GUIDED | FLAG_MAP, FLAG_GUIDED | FLAG_MAP | FLAG_ANCHORS] {
-        let mut r = Recording::new();
+        let mut r = Commands::new();
         d.record_forward(&mut r, &Batch { flags, iteration, ..batch(0.0, 0.0) });
         d.submit(&r);
         let out = d.read_ray_out(FRAMES * RAYS_PER_FRAME);
@@ -357,7 +356,7 @@ fn label_as_the_head(d: &mut Rig) {
             let first = labelled.len() as u32;
             let rays_per_frame = d.scratch.max_rays.min(pixels - first);
             let flags = FLAG_DENSE | FLAG_GUIDED;
-            let mut r = Recording::new();
+            let mut r = Commands::new();
             d.upload_window(&mut r, &[(slot, true)]);
             let b = Batch { frames: 1, rays_per_frame, first, flags, ..batch(0.0, 0.0) };
             d.record_forward(&mut r, &b);
@@ -366,7 +365,7 @@ fn label_as_the_head(d: &mut Rig) {
             let class = |ray: &[f32]| [128, 128, 128, ray[5].to_bits() as u8];
             labelled.extend(out.chunks_exact(RAY_OUT_FLOATS).map(class));
         }
-        let mut r = Recording::new();
+        let mut r = Commands::new();
         d.upload_color(&mut r, slot, &labelled);
         d.upload_window(&mut r, &WINDOW);
         d.submit(&r);
@@ -394,7 +393,7 @@ fn anchors_settle_by_the_heads_classes() {
         let before = head_and_anchors(&mut d, 999);
         for i in 0..60 {
             let b = Batch { iteration: i, ..batch(0.0, 0.0) };
-            let mut r = Recording::new();
+            let mut r = Commands::new();
             d.record_forward(&mut r, &b);
             // With a rate that falls to 0, as at the end of a run.
             let rate = 0.3 * f64::from(60 - i) / 60.0;
@@ -424,7 +423,7 @@ fn gradients_of_anchors_and_fused_features() {
         let mut d = supervised();
         assert!(ray_loss(&mut d, &b) > 0.01, "{name}: no loss");
         // One step with rate 0: Adam's first moments are a tenth of the gradients afterwards.
-        let mut r = Recording::new();
+        let mut r = Commands::new();
         d.record_forward(&mut r, &b);
         d.record_backward(&mut r, &b);
         d.record_step(&mut r, &b, Rates { planes: 0.0, decoders: 0.0 });
@@ -435,8 +434,12 @@ fn gradients_of_anchors_and_fused_features() {
             d.read(t.moment1, t.floats).iter().map(|m| m * 10.0).collect()
         });
         assert!(geometry.iter().chain(&appearance).all(|g| *g == 0.0), "{name}");
-        let s = GEOMETRY_FLOATS;
-        assert!(decoders[..s + 1188].iter().chain(&decoders[HEAD_FLOATS..]).all(|g| *g == 0.0));
+        assert!(
+            decoders[..SEMANTIC[0].weights]
+                .iter()
+                .chain(&decoders[HEAD_FLOATS..])
+                .all(|g| *g == 0.0)
+        );
         let fine = d.shape.surface[1][3] as usize * 16;
         let mut loss = |d: &mut Rig| ray_loss(d, &b);
         for (part, range) in [("coarse planes", 0..fine), ("fine planes", fine..semantic.len())] {
@@ -444,10 +447,10 @@ fn gradients_of_anchors_and_fused_features() {
             check(&mut d, tensors[2].values, &semantic, range, &name, &mut loss);
         }
         for (part, range) in [
-            ("layer 1", s + 1188..s + 2212),
-            ("bias 1", s + 2212..s + 2244),
-            ("layer 2", s + 2244..s + 2756),
-            ("bias 2", s + 2756..s + 2772),
+            ("layer 1", SEMANTIC[0].weight_range()),
+            ("bias 1", SEMANTIC[0].bias_range()),
+            ("layer 2", SEMANTIC[1].weight_range()),
+            ("bias 2", SEMANTIC[1].bias_range()),
         ] {
             let name = format!("{name}: {part}");
             check(&mut d, tensors[3].values, &decoders, range, &name, &mut loss);
@@ -464,7 +467,7 @@ fn the_feature_loss_moves_the_planes() {
         let before = [d.geometry, d.appearance, d.semantic].map(|t| d.read(t.values, t.floats));
         let start = ray_loss(&mut d, &batch(0.0, 1.0));
         for _ in 0..30 {
-            let mut r = Recording::new();
+            let mut r = Commands::new();
             d.record_forward(&mut r, b);
             d.record_backward(&mut r, b);
             d.record_step(&mut r, b, Rates { planes: 5e-3, decoders: 0.0 });
@@ -486,7 +489,7 @@ fn the_feature_loss_moves_the_planes() {
 
 /// The response of the appearance embedding at every token, in raster order.
 fn appearance(d: &mut Rig, frame: &Frame) -> Vec<Vec<u32>> {
-    let mut r = Recording::new();
+    let mut r = Commands::new();
     d.upload_frame(&mut r, SLOT, frame);
     d.record_fusion_forward(&mut r, SLOT);
     d.submit(&r);
@@ -553,7 +556,7 @@ fn an_image_smaller_than_a_token() {
     let c = config(FusionConfig::default());
     let mut d = Rig::new(Engine::cpu(), &c, camera, 0, fixture::shape());
     assert!(d.fusion.is_none() && d.suppressor.is_some());
-    let mut r = Recording::new();
+    let mut r = Commands::new();
     d.upload_frame(&mut r, 0, &fixture::frame_of(&camera, 0));
     d.upload_pose(&mut r, 0, &fixture::pose(0));
     d.upload_window(&mut r, &[(0, true), (0, true), (0, true)]);
@@ -602,7 +605,7 @@ fn bad_settings_are_refused_by_name() {
         let mut c = Config::default();
         change(&mut c);
         let error = c.validate().expect_err(field);
-        assert_eq!((error.field, error.found.as_str()), (*field, *found));
+        assert_eq!((error.path(), error.found()), (*field, Some(*found)));
         assert!(error.to_string().contains(field), "{error}");
     }
     // The edges of the ranges are good.

@@ -7,6 +7,7 @@
 //! derivatives along whole directions, where a kink is one term of many, may not.
 use glam::DVec3;
 use mte_slam_core::{
+    commands::Commands,
     config::{Config, Head, LossConfig},
     engine::Engine,
     kernels::{
@@ -14,9 +15,9 @@ use mte_slam_core::{
         sample_rays::SAMPLE_RAYS,
         shared::{FLAG_GUIDED, FLAG_MAP, FLAG_POSE},
     },
-    layout::{GEOMETRY_FLOATS, HEAD_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS},
+    layout::{HEAD_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_POSE},
     map::{Batch, ParameterTensor, Rates, SemanticSupervision},
-    recording::Recording,
+    shaders::decoders::{COLOR, GEOMETRY, SEMANTIC},
 };
 use mte_slam_tests::{
     TestRandom,
@@ -85,7 +86,7 @@ impl Problem {
         let mut problem = Problem { rig, loss, flags, rays_per_frame: RAYS_PER_FRAME };
         let state = State::new(&Options::default());
         let d = &mut problem.rig;
-        let mut r = Recording::new();
+        let mut r = Commands::new();
         for (tensor, name) in [
             (d.geometry, "planes_geometry"),
             (d.appearance, "planes_appearance"),
@@ -123,7 +124,7 @@ impl Problem {
     fn loss(&mut self) -> f64 {
         let loss = self.loss.clone();
         let batch = self.batch(&loss);
-        let mut r = Recording::new();
+        let mut r = Commands::new();
         self.rig.record_forward(&mut r, &batch);
         self.rig.record_backward(&mut r, &batch);
         self.rig.submit(&r);
@@ -132,12 +133,16 @@ impl Problem {
         total_loss(&out, &loss)
     }
 
-    fn read(&mut self, buffer: mte_slam_core::recording::BufferId, floats: usize) -> Vec<f32> {
+    fn read(
+        &mut self,
+        buffer: impl Into<mte_slam_core::commands::BufferId>,
+        floats: usize,
+    ) -> Vec<f32> {
         self.rig.read(buffer, floats)
     }
 
     fn set(&mut self, tensor: ParameterTensor, values: &[f32]) {
-        let mut r = Recording::new();
+        let mut r = Commands::new();
         r.upload(tensor.values, 0, values);
         self.rig.submit(&r);
     }
@@ -146,7 +151,7 @@ impl Problem {
     fn gradients(&mut self) -> [Vec<f32>; 4] {
         let loss = self.loss.clone();
         let batch = self.batch(&loss);
-        let mut r = Recording::new();
+        let mut r = Commands::new();
         self.rig.record_forward(&mut r, &batch);
         self.rig.record_backward(&mut r, &batch);
         self.rig.record_pose_step(&mut r, &batch, [0.0, 0.0], true);
@@ -251,13 +256,14 @@ fn geometry_planes_and_decoder() {
     let fine = d.shape.geometry[1][3] as usize * 16;
     check(&mut problem, planes, &geometry, 0..fine, "coarse geometry planes");
     check(&mut problem, planes, &geometry, fine..geometry.len(), "fine geometry planes");
+    let [first, second, last] = GEOMETRY;
     for (name, part) in [
-        ("geometry layer 1", 0..512),
-        ("geometry bias 1", 512..528),
-        ("geometry layer 2", 528..784),
-        ("geometry bias 2", 784..800),
-        ("geometry layer 3", 800..816),
-        ("geometry bias 3", 816..817),
+        ("geometry layer 1", first.weight_range()),
+        ("geometry bias 1", first.bias_range()),
+        ("geometry layer 2", second.weight_range()),
+        ("geometry bias 2", second.bias_range()),
+        ("geometry layer 3", last.weight_range()),
+        ("geometry bias 3", last.bias_range()),
     ] {
         check(&mut problem, weights, &decoders, part, name);
     }
@@ -271,12 +277,11 @@ fn appearance_and_colour_decoder() {
     let fine = problem.rig.shape.surface[1][3] as usize * 16;
     check(&mut problem, planes, &appearance, 0..fine, "coarse appearance planes");
     check(&mut problem, planes, &appearance, fine..appearance.len(), "fine appearance planes");
-    let s = GEOMETRY_FLOATS;
     for (name, part) in [
-        ("colour layer 1", s..s + 1024),
-        ("colour bias 1", s + 1024..s + 1056),
-        ("colour layer 2", s + 1056..s + 1184),
-        ("colour bias 2", s + 1184..s + 1188),
+        ("colour layer 1", COLOR[0].weight_range()),
+        ("colour bias 1", COLOR[0].bias_range()),
+        ("colour layer 2", COLOR[1].weight_range()),
+        ("colour bias 2", COLOR[1].bias_range()),
     ] {
         check(&mut problem, weights, &decoders, part, name);
     }
@@ -290,13 +295,13 @@ fn semantic_planes_decoder_and_head() {
     let fine = problem.rig.shape.surface[1][3] as usize * 16;
     check(&mut problem, planes, &semantic, 0..fine, "coarse semantic planes");
     check(&mut problem, planes, &semantic, fine..semantic.len(), "fine semantic planes");
-    let (s, head) = (GEOMETRY_FLOATS, HEAD_FLOATS);
+    let head = HEAD_FLOATS;
     let bias = head + CLASSES as usize * 16;
     for (name, part) in [
-        ("semantic layer 1", s + 1188..s + 2212),
-        ("semantic bias 1", s + 2212..s + 2244),
-        ("semantic layer 2", s + 2244..s + 2756),
-        ("semantic bias 2", s + 2756..s + 2772),
+        ("semantic layer 1", SEMANTIC[0].weight_range()),
+        ("semantic bias 1", SEMANTIC[0].bias_range()),
+        ("semantic layer 2", SEMANTIC[1].weight_range()),
+        ("semantic bias 2", SEMANTIC[1].bias_range()),
         ("class head", head..bias),
         ("class head's bias", bias..bias + CLASSES as usize),
     ] {
@@ -334,7 +339,7 @@ fn per_sample_head_and_semantic_planes() {
     check(&mut problem, planes, &semantic, 0..fine, "coarse semantic planes");
     check(&mut problem, planes, &semantic, fine..semantic.len(), "fine semantic planes");
     // The ray's decoders of classes rest; geometry gets what it gets without classes.
-    assert!(decoders[GEOMETRY_FLOATS + 1188..].iter().all(|g| *g == 0.0));
+    assert!(decoders[SEMANTIC[0].weights..].iter().all(|g| *g == 0.0));
     let mut without = Problem::new(Engine::cpu(), LossConfig { semantic: 0.0, ..losses() });
     without.rays_per_frame = problem.rays_per_frame;
     assert!(without.gradients()[0] == geometry);
@@ -356,7 +361,7 @@ fn semantic_gradients_stop_at_the_weights() {
     let mut problem = Problem::new(Engine::cpu(), only);
     let [geometry, appearance, semantic, decoders] = problem.gradients();
     assert!(geometry.iter().chain(&appearance).all(|g| *g == 0.0));
-    assert!(decoders[..GEOMETRY_FLOATS + 1188].iter().all(|g| *g == 0.0));
+    assert!(decoders[..SEMANTIC[0].weights].iter().all(|g| *g == 0.0));
     assert!(semantic.iter().any(|g| *g != 0.0));
     let state = problem.rig.read_pose_state(0);
     assert!(state[26..32].iter().all(|g| *g == 0.0), "{state:?}");
@@ -401,7 +406,7 @@ fn poses_of_the_window() {
 }
 
 fn place(problem: &mut Problem, slot: u32, pose: &Pose) {
-    let mut r = Recording::new();
+    let mut r = Commands::new();
     problem.rig.upload_pose(&mut r, slot, pose);
     problem.rig.submit(&r);
 }
@@ -453,7 +458,7 @@ fn rays_without_depth_teach_colour() {
     let mut pose_gradient = [0.0; 6];
     for ray in state.floats("ray_state").chunks_exact(RAY_STATE_FLOATS).skip(rays).take(rays) {
         for k in 0..3 {
-            pose_gradient[k] += f64::from(ray[296 + k]);
+            pose_gradient[k] += f64::from(ray[STATE_POSE as usize * 4 + k]);
             pose_gradient[3 + k] += f64::from(ray[300 + k]);
         }
     }

@@ -1,5 +1,6 @@
 //! Mistakes known from other systems of this kind, on both engines.
 use mte_slam_core::{
+    commands::Commands,
     config::{Config, LossConfig},
     engine::Engine,
     kernels::{
@@ -10,7 +11,7 @@ use mte_slam_core::{
     },
     layout::{CHANNELS, RAY_STATE_FLOATS, STATE_DEPTH},
     map::{Batch, SemanticSupervision},
-    recording::Recording,
+    shaders::decoders::GEOMETRY,
 };
 use mte_slam_tests::{
     f32_words,
@@ -75,8 +76,9 @@ fn wall(state: &mut State, wall_m: f32) {
     let mut w = vec![0.0; state.buffers["decoders"].len()];
     // relu(x) - relu(-x) through both hidden layers.
     (w[0], w[1]) = (1.0, -1.0);
-    (w[528], w[528 + 17]) = (1.0, 1.0);
-    (w[800], w[801]) = (1.0, -1.0);
+    let [_, second, last] = GEOMETRY.map(|layer| layer.weights);
+    (w[second], w[second + 17]) = (1.0, 1.0);
+    (w[last], w[last + 1]) = (1.0, -1.0);
     state.buffers.insert("planes_geometry", f32_words(planes));
     state.buffers.insert("decoders", f32_words(w));
 }
@@ -213,13 +215,13 @@ fn a_reused_slot_forgets_the_pose_steps_of_its_former_frame() {
     let last_step = |engine: Engine, former: Option<u32>| {
         let (camera, shape) = (fixture::camera(), fixture::shape());
         let d = &mut Rig::new(engine, &config, camera, 0, shape);
-        let mut r = Recording::new();
+        let mut r = Commands::new();
         let state = State::new(&Options::default());
         r.upload(d.geometry.values, 0, &state.buffers["planes_geometry"]);
         r.upload(d.appearance.values, 0, &state.buffers["planes_appearance"]);
         r.upload(d.decoders.values, 0, &state.buffers["decoders"]);
         d.upload_window(&mut r, &[(SLOT, false)]);
-        let step = |r: &mut Recording, iteration| {
+        let step = |r: &mut Commands, iteration| {
             let batch = Batch {
                 frames: 1,
                 rays_per_frame: RAYS,

@@ -1,26 +1,22 @@
 //! Files of a run.
-use crate::{
-    events::{emit, progress},
-    failure::Failure,
-    message::*,
-    run::Run,
-};
-use mte_slam_core::slam::TrackingStatus;
+use crate::{failure::Failure, message::*, run::OpenRun};
+use mte_slam_core::slam::{PoseEstimate, TrackingStatus};
 use mte_slam_mesh::{write_glb, write_glb_by_class, write_ply};
-use mte_slam_metrics::{PosePair, ate};
+use mte_slam_metrics::ate;
 use mte_slam_types::trajectory_file::write_tum;
 
-impl Run {
+impl OpenRun {
     pub async fn export(&mut self, export: &ExportCommand) -> Result<(), Failure> {
-        let name = self.slam.info().name.clone();
+        let slam = self.run.slam_mut();
+        let name = slam.info().name.clone();
         let failed = |e: &dyn std::fmt::Display| Failure::new(ErrorKind::Engine, e.to_string());
         let (suffix, mime, bytes) = match export.kind {
             ExportKind::Ply | ExportKind::Glb | ExportKind::GlbClasses => {
-                let resolution =
-                    export.resolution_m.unwrap_or(self.slam.config().mesh.resolution_m);
-                let mut report = |part: f64| progress("extracting the mesh", part, 1.0);
-                let mesh = self.slam.extract_mesh(resolution, &mut report).await?;
-                let classes = &self.slam.info().classes;
+                let resolution = export.resolution_m.unwrap_or(slam.config().mesh.resolution_m);
+                let page = &self.page;
+                let mut report = |part: f64| page.progress("extracting the mesh", part, 1.0);
+                let mesh = slam.extract_mesh(resolution, &mut report).await?;
+                let classes = &slam.info().classes;
                 let glb = "model/gltf-binary";
                 match export.kind {
                     ExportKind::Ply => (
@@ -36,7 +32,7 @@ impl Run {
                 }
             }
             ExportKind::Trajectory => {
-                let poses = self.slam.trajectory();
+                let poses = slam.trajectory();
                 let text = write_tum(poses.iter().map(|p| (p.time_s, p.world_from_camera)));
                 ("-trajectory.txt", "text/plain", text.into_bytes())
             }
@@ -44,11 +40,11 @@ impl Run {
                 ("-metrics.json", "application/json", self.metrics_json().into_bytes())
             }
             ExportKind::Checkpoint => {
-                let saved = self.slam.checkpoint().await?;
+                let saved = slam.checkpoint().await?;
                 ("-checkpoint.safetensors", "application/octet-stream", saved.to_bytes())
             }
         };
-        emit(&Event::Exported(ExportedEvent {
+        self.page.emit(&Event::Exported(ExportedEvent {
             kind: export.kind,
             name: format!("{name}{suffix}"),
             mime: mime.into(),
@@ -58,28 +54,23 @@ impl Run {
     }
 
     fn metrics_json(&self) -> String {
-        let info = self.slam.info();
-        let poses = self.slam.trajectory();
-        let pairs: Vec<PosePair> = poses
-            .iter()
-            .filter_map(|p| {
-                let truth = self.feed.truth(p.frame)?;
-                Some(PosePair { estimate: p.world_from_camera, truth })
-            })
-            .collect();
-        let lost: Vec<usize> =
-            poses.iter().filter(|p| p.status == TrackingStatus::Lost).map(|p| p.frame).collect();
+        let slam = self.run.slam();
+        let info = slam.info();
+        let poses = slam.trajectory();
+        let lost = |p: &PoseEstimate| (p.status == TrackingStatus::Lost).then_some(p.frame);
+        let lost: Vec<usize> = poses.iter().filter_map(lost).collect();
+        let frames: Vec<MetricsEvent> = self.figures.iter().map(|f| self.metrics(f)).collect();
         let value = serde_json::json!({
             "program": format!("mte-slam-web {}", env!("CARGO_PKG_VERSION")),
             "sequence": { "name": info.name, "layout": info.layout, "frames": info.frames,
                 "width_pixels": info.camera.width, "height_pixels": info.camera.height },
             "engine": { "kind": self.engine.kind, "adapter": self.engine.adapter },
             "settings": self.settings,
-            "configuration": self.slam.config(),
+            "configuration": slam.config(),
             "frames_processed": poses.len(),
             "lost_frames": lost,
-            "trajectory": ate(&pairs).ok(),
-            "frames": self.metrics,
+            "trajectory": ate(&self.pose_pairs()).ok(),
+            "frames": frames,
         });
         format!("{value:#}\n")
     }

@@ -1,6 +1,7 @@
 //! Why a command was not followed.
 use crate::{feed::FeedError, message::*, settings::SettingsError};
 use mte_slam_core::{engine::EngineError, slam::SlamError};
+use mte_slam_run::RunError;
 use mte_slam_types::sequence::SequenceError;
 
 /// See the module.
@@ -59,5 +60,16 @@ impl From<FeedError> for Failure {
         // The map is as it was; the frame can be asked for again.
         failure.0.resumable = true;
         failure
+    }
+}
+
+impl From<RunError<FeedError>> for Failure {
+    fn from(e: RunError<FeedError>) -> Failure {
+        match e {
+            RunError::Input { error, .. } => error.into(),
+            RunError::Frame { error, .. } | RunError::Finish(error) | RunError::Resume(error) => {
+                error.into()
+            }
+        }
     }
 }

@@ -2,6 +2,7 @@
 //! decoded frames from `mte-slam serve`, which the browser takes as fast as they are used.
 use crate::{message::ErrorKind, platform::sleep, source::last_part};
 use js_sys::{Reflect, Uint8Array};
+use mte_slam_run::{Event, Host, Input};
 use mte_slam_types::{
     camera::Camera,
     classes::ClassTable,
@@ -24,8 +25,15 @@ pub struct FeedError {
     pub message: String,
 }
 
-/// Frames in order.
-pub enum Feed {
+/// Frames in order, with or without their labels.
+pub struct Feed {
+    source: FeedSource,
+    /// Without classes where labels are not wanted.
+    info: SequenceInfo,
+}
+
+/// How frames are had.
+pub enum FeedSource {
     /// Read by index.
     Sequence(Box<dyn Sequence>),
     /// Received in order.
@@ -33,39 +41,57 @@ pub enum Feed {
 }
 
 impl Feed {
-    pub fn info(&self) -> &SequenceInfo {
-        match self {
-            Feed::Sequence(s) => s.info(),
-            Feed::Stream(s) => &s.info,
+    pub fn new(source: FeedSource, labels: bool) -> Feed {
+        let mut info = match &source {
+            FeedSource::Sequence(s) => s.info().clone(),
+            FeedSource::Stream(s) => s.info.clone(),
+        };
+        if !labels {
+            info.classes = ClassTable::default();
         }
+        Feed { source, info }
+    }
+
+    pub fn info(&self) -> &SequenceInfo {
+        &self.info
     }
 
     pub fn truth(&self, index: usize) -> Option<Pose> {
-        match self {
-            Feed::Sequence(s) => s.truth(index),
-            Feed::Stream(s) => s.truth.get(index).copied().flatten(),
+        match &self.source {
+            FeedSource::Sequence(s) => s.truth(index),
+            FeedSource::Stream(s) => s.truth.get(index).copied().flatten(),
         }
     }
 
     pub fn warnings(&self) -> Vec<String> {
-        match self {
-            Feed::Sequence(s) => s.warnings(),
-            Feed::Stream(s) => s.warnings.clone(),
+        match &self.source {
+            FeedSource::Sequence(s) => s.warnings(),
+            FeedSource::Stream(s) => s.warnings.clone(),
         }
     }
+}
 
-    /// Frame `index`. `notice` hears of attempts to reach a server again.
-    pub async fn frame(
+impl Input for Feed {
+    type Error = FeedError;
+
+    async fn read_frame(
         &mut self,
         index: usize,
-        notice: &dyn Fn(String),
-    ) -> Result<Frame, FeedError> {
-        match self {
-            Feed::Sequence(s) => s
-                .frame(index)
-                .map_err(|e| FeedError { kind: ErrorKind::BadFile, message: e.to_string() }),
-            Feed::Stream(s) => s.frame(index, notice).await,
+        host: &mut dyn Host,
+    ) -> Result<Option<Frame>, FeedError> {
+        if index >= self.info.frames {
+            return Ok(None);
         }
+        let mut frame = match &mut self.source {
+            FeedSource::Sequence(s) => s
+                .frame(index)
+                .map_err(|e| FeedError { kind: ErrorKind::BadFile, message: e.to_string() })?,
+            FeedSource::Stream(s) => s.frame(index, host).await?,
+        };
+        if self.info.classes.is_empty() {
+            frame.labels = None;
+        }
+        Ok(Some(frame))
     }
 }
 
@@ -162,14 +188,15 @@ impl Stream {
         })
     }
 
-    async fn frame(&mut self, index: usize, notice: &dyn Fn(String)) -> Result<Frame, FeedError> {
+    async fn frame(&mut self, index: usize, host: &mut dyn Host) -> Result<Frame, FeedError> {
         let mut attempt = 0;
         loop {
             match self.attempt(index).await {
                 Err(e) if e.kind == ErrorKind::ServerGone && attempt < ATTEMPTS => {
                     self.open = None;
                     attempt += 1;
-                    notice(format!("{}; trying again ({attempt} of {ATTEMPTS})", e.message));
+                    let text = format!("{}; trying again ({attempt} of {ATTEMPTS})", e.message);
+                    host.event(Event::Notice(&text));
                     sleep(250 << attempt).await;
                 }
                 other => return other,

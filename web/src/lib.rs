@@ -32,9 +32,9 @@ pub fn version() -> String {
 }
 
 /// Names of the presets.
-#[wasm_bindgen]
+#[wasm_bindgen(unchecked_return_type = "Preset[]")]
 pub fn presets() -> Vec<String> {
-    settings::PRESETS.iter().map(|s| (*s).into()).collect()
+    mte_slam_core::config::Config::PRESETS.map(Into::into).into()
 }
 
 /// The configuration that settings give, for pages that show what can be changed.

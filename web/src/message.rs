@@ -45,7 +45,7 @@ pub struct OpenCommand {
     #[tsify(optional)]
     pub keep: bool,
     /// Bytes of a `saved` event: go on from there. The recording must be the same; of the settings
-    /// only `engine` and `unroll` are taken, the rest is as it was.
+    /// only `engine` is taken, the rest is as it was.
     #[serde(default, with = "serde_wasm_bindgen::preserve")]
     #[tsify(optional, type = "Uint8Array")]
     pub resume: JsValue,
@@ -309,7 +309,7 @@ pub struct TrajectoryEvent {
 }
 
 /// Of [`Event::Metrics`].
-#[derive(Clone, Debug, Serialize, Deserialize, Tsify)]
+#[derive(Clone, Debug, Serialize, Tsify)]
 #[serde(rename_all = "camelCase")]
 pub struct MetricsEvent {
     /// Frame.
@@ -335,7 +335,7 @@ pub struct MetricsEvent {
 }
 
 /// Mean losses, weighted as optimised.
-#[derive(Clone, Debug, Serialize, Deserialize, Tsify)]
+#[derive(Clone, Debug, Serialize, Tsify)]
 pub struct LossFigures {
     /// Sum of the others.
     pub total: f64,

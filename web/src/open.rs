@@ -1,29 +1,31 @@
 //! Opening a recording: what the command says, the engine, the frames.
 use crate::{
-    events::{breathe, emit, progress, warn},
+    events::Page,
     failure::Failure,
-    feed::{Feed, Stream},
+    feed::{Feed, FeedSource, Stream},
     message::*,
     platform::{clock_s, has_webgpu, next_turn},
-    run::Run,
-    saved::SavedRun,
+    run::OpenRun,
+    saved::Kept,
     settings::{EngineChoice, LabelChoice, Settings},
     source::{FilesSource as Folder, HttpSource, ZipSource as Archive},
 };
 use js_sys::Reflect;
 use mte_slam_core::{
     engine::{Engine, GpuOptions},
-    slam::{LiveMesh, Slam},
+    slam::LiveMesh,
 };
 use mte_slam_dataset::{LabelSource, OpenOptions};
+use mte_slam_run::{Run, SavedRun};
 use mte_slam_synth::{SceneKind, SyntheticOptions, SyntheticSequence};
-use mte_slam_types::{classes::ClassTable, pose::Pose, sequence::Source};
+use mte_slam_types::{pose::Pose, sequence::Source};
 use serde::de::DeserializeOwned;
 use wasm_bindgen::{JsCast, JsValue};
 
 /// Chunks of the growing mesh that are extracted after a frame; the rest waits for later frames.
-const CHUNKS_A_FRAME_GPU: usize = 160;
-const CHUNKS_A_FRAME_CPU: usize = 48;
+const CHUNKS_PER_FRAME_GPU: usize = 160;
+const CHUNKS_PER_FRAME_CPU: usize = 48;
+
 pub fn text(object: &JsValue, key: &str) -> Option<String> {
     Reflect::get(object, &key.into()).ok()?.as_string()
 }
@@ -59,8 +61,7 @@ async fn engine(settings: &Settings) -> Result<(Engine, Option<String>), Failure
         return Ok((Engine::cpu(), None));
     }
     let failure = if has_webgpu() {
-        let overrides = if settings.unroll { Vec::new() } else { vec![("UNROLL", 0)] };
-        match Engine::gpu(GpuOptions { overrides, ..GpuOptions::default() }).await {
+        match Engine::gpu(GpuOptions::default()).await {
             Ok(engine) => return Ok((engine, None)),
             Err(e) => Failure::from(e),
         }
@@ -73,7 +74,11 @@ async fn engine(settings: &Settings) -> Result<(Engine, Option<String>), Failure
     }
 }
 
-async fn open_feed(spec: &JsValue, settings: &Settings) -> Result<Feed, Failure> {
+async fn open_source(
+    page: &Page,
+    spec: &JsValue,
+    settings: &Settings,
+) -> Result<FeedSource, Failure> {
     let source: Box<dyn Source> = match text(spec, "kind").as_deref() {
         Some("built-in") => {
             let wanted: BuiltInSource = parse(spec, "source")?;
@@ -93,7 +98,7 @@ async fn open_feed(spec: &JsValue, settings: &Settings) -> Result<Feed, Failure>
                 );
                 return Err(Failure::new(ErrorKind::BadSettings, message));
             }
-            return Ok(Feed::Sequence(Box::new(SyntheticSequence::new(SyntheticOptions {
+            return Ok(FeedSource::Sequence(Box::new(SyntheticSequence::new(SyntheticOptions {
                 width: wanted.width,
                 height: wanted.width / 4 * 3,
                 frames,
@@ -104,7 +109,7 @@ async fn open_feed(spec: &JsValue, settings: &Settings) -> Result<Feed, Failure>
         }
         Some("serve") => {
             let UrlSource { url } = parse(spec, "source")?;
-            return Ok(Feed::Stream(Box::new(Stream::open(&url).await?)));
+            return Ok(FeedSource::Stream(Box::new(Stream::open(&url).await?)));
         }
         Some("files") => {
             let FilesSource { name, files } = parse(spec, "source")?;
@@ -121,7 +126,9 @@ async fn open_feed(spec: &JsValue, settings: &Settings) -> Result<Feed, Failure>
             let UrlSource { url } = parse(spec, "source")?;
             let archive = Archive::remote(&url)?;
             if archive.whole {
-                warn(format!("{url}: the server sends no ranges, so the whole archive was loaded"));
+                page.warn(format!(
+                    "{url}: the server sends no ranges, so the whole archive was loaded"
+                ));
             }
             Box::new(archive)
         }
@@ -147,83 +154,69 @@ async fn open_feed(spec: &JsValue, settings: &Settings) -> Result<Feed, Failure>
         },
         ..OpenOptions::default()
     };
-    Ok(Feed::Sequence(mte_slam_dataset::open(source, options)?))
+    Ok(FeedSource::Sequence(mte_slam_dataset::open(source, options)?))
 }
 
-impl Run {
+impl OpenRun {
     /// A run from the first frame.
-    pub async fn open(source: &JsValue, settings: Settings) -> Result<Run, Failure> {
-        Run::begin(source, settings, None).await
-    }
-
-    /// A run that goes on from a saved state, on the engine that `settings` name.
-    pub async fn resume(
+    pub async fn open(
+        page: &Page,
         source: &JsValue,
         settings: Settings,
-        saved: SavedRun,
-    ) -> Result<Run, Failure> {
-        let Settings { engine, unroll, .. } = settings;
-        let settings = Settings { engine, unroll, ..saved.progress.settings.clone() };
-        let mut run = Run::begin(source, settings, Some(&saved)).await?;
-        let SavedRun { progress: state, checkpoint } = saved;
-        drop(checkpoint);
-        run.next = state.next;
-        run.begun_s = Some(clock_s() - state.seconds);
-        run.finished = state.finished;
-        run.metrics = state.metrics;
-        for figures in &run.metrics {
-            emit(&Event::Metrics(figures.clone()));
+    ) -> Result<OpenRun, Failure> {
+        OpenRun::begin(page, source, settings, None).await
+    }
+
+    /// A run that continues from a saved state, on the engine that `settings` name.
+    pub async fn resume(
+        page: &Page,
+        source: &JsValue,
+        settings: Settings,
+        saved: SavedRun<Kept>,
+    ) -> Result<OpenRun, Failure> {
+        let settings = Settings { engine: settings.engine, ..saved.host.settings.clone() };
+        let mut open = OpenRun::begin(page, source, settings, Some(saved)).await?;
+        for figures in &open.figures {
+            page.emit(&Event::Metrics(open.metrics(figures)));
         }
-        run.refresh().await?;
-        progress("frames", run.next as f64, run.feed.info().frames as f64);
-        if run.finished {
-            run.report_done();
+        open.refresh().await?;
+        page.progress("frames", open.run.next_frame() as f64, open.feed.info().frames as f64);
+        if open.run.is_finished() {
+            open.shown_finished = true;
+            open.report_done();
         }
-        Ok(run)
+        Ok(open)
     }
 
     async fn begin(
+        page: &Page,
         source: &JsValue,
         settings: Settings,
-        saved: Option<&SavedRun>,
-    ) -> Result<Run, Failure> {
+        saved: Option<SavedRun<Kept>>,
+    ) -> Result<OpenRun, Failure> {
+        let mut page = page.clone();
         let config = settings.config()?;
-        progress("opening the recording", 0.0, 1.0);
+        page.progress("opening the recording", 0.0, 1.0);
         next_turn().await;
-        let mut feed = open_feed(source, &settings).await?;
-        if let Some(saved) = saved {
-            saved.progress.check(feed.info())?;
+        let source = open_source(&page, source, &settings).await?;
+        let mut feed = Feed::new(source, settings.labels != LabelChoice::None);
+        if let Some(saved) = &saved {
+            saved.host.check(feed.info())?;
         }
-        let mut info = feed.info().clone();
-        if settings.labels == LabelChoice::None {
-            info.classes = ClassTable::default();
-        }
-        progress("starting the engine", 0.0, 1.0);
+        let info = feed.info().clone();
+        page.progress("starting the engine", 0.0, 1.0);
         let (engine, why) = engine(&settings).await?;
         let found = engine.info();
         let description =
             EngineDescription { kind: found.kind.into(), adapter: found.adapter, why: why.clone() };
         let cpu = found.kind == "cpu";
-        let mut slam = match saved {
-            Some(saved) => {
-                let checkpoint = &saved.checkpoint;
-                let mut resuming = Slam::resume(engine, config, &info, checkpoint).await?;
-                let missing: Vec<usize> = resuming.missing().collect();
-                for (i, index) in missing.iter().enumerate() {
-                    progress("reading keyframes again", i as f64, missing.len() as f64);
-                    next_turn().await;
-                    let mut frame = feed.frame(*index, &warn).await?;
-                    if info.classes.is_empty() {
-                        frame.labels = None;
-                    }
-                    resuming.add(&frame)?;
-                }
-                resuming.finish()?
+        let (run, figures) = match saved {
+            Some(mut saved) => {
+                let figures = std::mem::take(&mut saved.host.figures);
+                (saved.resume(engine, config, &info, &mut feed, &mut page).await?, figures)
             }
-            None => Slam::new(engine, config, &info).await?,
+            None => (Run::new(engine, config, &info).await?, Vec::new()),
         };
-        slam.set_clock(clock_s);
-        slam.set_breathe(breathe);
         let truth: Vec<Option<Pose>> = (0..info.frames).map(|i| feed.truth(i)).collect();
         let known = truth.iter().any(Option::is_some);
         let position = |p: &Option<Pose>| {
@@ -231,11 +224,11 @@ impl Run {
             t.into_iter().flat_map(f32::to_le_bytes).collect::<Vec<u8>>()
         };
         let camera = info.camera;
-        emit(&Event::Opened(OpenedEvent {
+        page.emit(&Event::Opened(OpenedEvent {
             name: info.name.clone(),
             layout: info.layout.into(),
             frames: info.frames,
-            next: saved.map_or(0, |s| s.progress.next),
+            next: run.next_frame(),
             width: camera.width,
             height: camera.height,
             focal: camera.fy / (0.5 * f64::from(camera.height)),
@@ -248,23 +241,21 @@ impl Run {
             engine: description.clone(),
             warnings: feed.warnings(),
             truth: if known { truth.iter().flat_map(position).collect() } else { Vec::new() },
-            config: serde_json::to_value(slam.config()).unwrap_or_default(),
+            config: serde_json::to_value(run.slam().config()).unwrap_or_default(),
         }));
-        Ok(Run {
+        Ok(OpenRun {
+            page,
             feed,
+            run,
             live: LiveMesh::new(settings.live_resolution_m),
-            slam,
             settings,
-            chunks_a_frame: if cpu { CHUNKS_A_FRAME_CPU } else { CHUNKS_A_FRAME_GPU },
-            next: 0,
-            begun_s: None,
-            finished: false,
-            metrics: Vec::new(),
+            chunks_per_frame: if cpu { CHUNKS_PER_FRAME_CPU } else { CHUNKS_PER_FRAME_GPU },
+            shown_finished: false,
+            figures,
             engine: description,
             keep: false,
             saved_s: clock_s(),
             save_pause_s: 0.0,
-            settled: true,
         })
     }
 }

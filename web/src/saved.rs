@@ -1,23 +1,20 @@
 //! A run's state, kept now and then, so that a lost device, a crash or a reload costs a few frames:
-//! the core's checkpoint, with what this crate knows of the run in an entry of its metadata.
-use crate::{
-    events::emit, failure::Failure, message::*, platform::clock_s, run::Run, settings::Settings,
-};
+//! the run's checkpoint, with what this crate adds to it.
+use crate::{failure::Failure, message::*, platform::clock_s, run::OpenRun, settings::Settings};
 use js_sys::Uint8Array;
 use mte_slam_core::slam::Checkpoint;
+use mte_slam_run::SavedRun;
 use mte_slam_types::{camera::Camera, frame::SequenceInfo};
 use serde::{Deserialize, Serialize};
 
-/// Name of the metadata entry.
-const ENTRY: &str = "session";
 /// Shortest time between two states \[s\].
 const PAUSE_S: f64 = 5.0;
-/// At most one part in so many of the time goes into making states.
+/// At most one part in this many of the time goes into making states.
 const SHARE: f64 = 20.0;
 
-/// What a session adds to the core's checkpoint.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Progress {
+/// What a session adds to a run's checkpoint.
+#[derive(Serialize, Deserialize)]
+pub struct Kept {
     /// The recording's name, to be compared with what is opened.
     pub name: String,
     /// Frames of the recording.
@@ -26,20 +23,23 @@ pub struct Progress {
     pub camera: Camera,
     /// How it is processed.
     pub settings: Settings,
-    /// The frame that comes next.
-    pub next: usize,
-    /// Time from the first frame \[s\].
-    pub seconds: f64,
-    /// Whether the map has been refined after the last frame.
-    pub finished: bool,
-    /// Figures of the frames so far.
-    pub metrics: Vec<MetricsEvent>,
+    /// Figures of the frames so far, beside those that the run keeps.
+    pub figures: Vec<PageFigures>,
 }
 
-/// A checkpoint and the session's part of it.
-pub struct SavedRun {
-    pub checkpoint: Checkpoint,
-    pub progress: Progress,
+/// What the page measures of a frame, beside what the run keeps of it.
+#[derive(Clone, Serialize, Deserialize)]
+pub struct PageFigures {
+    /// Frame.
+    pub index: usize,
+    /// Time of the frame with reading, meshing and drawing \[ms\].
+    pub total_ms: f64,
+    /// Absolute trajectory error so far \[cm\].
+    pub ate_cm: Option<f64>,
+    /// Buffers on the device \[bytes\].
+    pub device_bytes: f64,
+    /// Memory of the WebAssembly module \[bytes\].
+    pub wasm_bytes: f64,
 }
 
 fn wrong(what: &str, found: impl std::fmt::Debug, expected: impl std::fmt::Debug) -> Failure {
@@ -47,23 +47,17 @@ fn wrong(what: &str, found: impl std::fmt::Debug, expected: impl std::fmt::Debug
     Failure::new(ErrorKind::BadFile, message)
 }
 
-impl SavedRun {
-    /// From the bytes of a `saved` event.
-    pub fn from_bytes(bytes: &[u8]) -> Result<SavedRun, Failure> {
-        let mut checkpoint = Checkpoint::from_bytes(bytes)?;
-        let Some(text) = checkpoint.metadata.remove(ENTRY) else {
-            return Err(wrong("metadata", "nothing", ENTRY));
-        };
-        let progress: Progress = serde_json::from_str(&text)
-            .map_err(|e| wrong(ENTRY, e.to_string(), "the state of a session"))?;
-        if progress.next == 0 || progress.next > progress.frames {
-            return Err(wrong("next frame", progress.next, 1..=progress.frames));
-        }
-        Ok(SavedRun { checkpoint, progress })
+/// Reads the bytes of a `saved` event.
+pub fn saved_run(bytes: &[u8]) -> Result<SavedRun<Kept>, Failure> {
+    let saved = SavedRun::<Kept>::new(Checkpoint::from_bytes(bytes)?)?;
+    let (next, frames) = (saved.frames(), saved.host.frames);
+    if next == 0 || next > frames {
+        return Err(wrong("next frame", next, 1..=frames));
     }
+    Ok(saved)
 }
 
-impl Progress {
+impl Kept {
     /// Whether this is the recording that was saved, as far as can be said without its images.
     ///
     /// # Errors
@@ -83,35 +77,27 @@ impl Progress {
     }
 }
 
-impl Run {
+impl OpenRun {
     /// Whether it is time for another state.
     pub fn save_is_due(&self) -> bool {
         self.keep && clock_s() - self.saved_s >= self.save_pause_s
     }
 
-    /// Emits the state of the run.
+    /// Emits the state of the run, unless there is nothing that opening again would not bring.
     pub async fn save(&mut self) -> Result<(), Failure> {
-        // Before the first frame there is nothing that opening again would not bring.
-        if self.next == 0 || !self.settled {
-            return Ok(());
-        }
         let begun_s = clock_s();
         let info = self.feed.info();
-        let progress = Progress {
+        let frames = info.frames;
+        let kept = Kept {
             name: info.name.clone(),
-            frames: info.frames,
+            frames,
             camera: info.camera,
             settings: self.settings.clone(),
-            next: self.next,
-            seconds: self.seconds(),
-            finished: self.finished,
-            metrics: self.metrics.clone(),
+            figures: self.figures.clone(),
         };
-        let text = serde_json::to_string(&progress)
-            .map_err(|e| Failure::new(ErrorKind::Engine, e.to_string()))?;
-        let frames = info.frames;
-        let mut checkpoint = self.slam.checkpoint().await?;
-        checkpoint.metadata.insert(ENTRY.into(), text);
+        let Some(checkpoint) = self.run.checkpoint(&kept, &self.page).await? else {
+            return Ok(());
+        };
         let parts = checkpoint.parts();
         let bytes = Uint8Array::new_with_length(parts.iter().map(|p| p.len() as u32).sum());
         let mut at = 0;
@@ -120,7 +106,8 @@ impl Run {
             bytes.subarray(at, end).copy_from(part);
             at = end;
         }
-        emit(&Event::Saved(SavedEvent { frame: self.next, frames, bytes: bytes.into() }));
+        let frame = self.run.next_frame();
+        self.page.emit(&Event::Saved(SavedEvent { frame, frames, bytes: bytes.into() }));
         self.saved_s = clock_s();
         self.save_pause_s = PAUSE_S.max(SHARE * (self.saved_s - begun_s));
         Ok(())
@@ -133,12 +120,12 @@ mod tests {
 
     #[test]
     fn a_file_that_is_no_saved_run_is_refused() {
-        let error = |bytes: &[u8]| SavedRun::from_bytes(bytes).err().map(|f| f.0.message);
+        let error = |bytes: &[u8]| saved_run(bytes).err().map(|f| f.0.message);
         assert!(error(b"nothing").is_some_and(|m| m.contains("checkpoint")));
         let plain = Checkpoint::default().to_bytes();
-        assert!(error(&plain).is_some_and(|m| m.contains("session")));
+        assert!(error(&plain).is_some_and(|m| m.contains("the state of a run")));
         let mut other = Checkpoint::default();
-        other.metadata.insert(ENTRY.into(), "{}".into());
+        other.metadata.insert("run".into(), "{}".into());
         assert!(error(&other.to_bytes()).is_some_and(|m| m.contains("missing field")));
     }
 }

@@ -1,11 +1,11 @@
 //! One run: commands in, events out.
 use crate::{
-    events::{self, emit},
+    events::Page,
     failure::Failure,
     message::*,
     open::{check_settings, parse, text},
-    run::Run,
-    saved::SavedRun,
+    run::OpenRun,
+    saved::saved_run,
 };
 use js_sys::{Function, Uint8Array};
 use wasm_bindgen::prelude::*;
@@ -14,18 +14,18 @@ use wasm_bindgen::prelude::*;
 /// next.
 #[wasm_bindgen]
 pub struct Session {
-    run: Option<Run>,
+    page: Page,
+    run: Option<OpenRun>,
 }
 
 #[wasm_bindgen]
 impl Session {
-    /// A session without a recording; `emit` hears its events.
+    /// A session without a recording; `emit` is called with its events.
     #[wasm_bindgen(constructor)]
     pub fn new(
         #[wasm_bindgen(unchecked_param_type = "(event: Event) => void")] emit: Function,
     ) -> Session {
-        events::listen(emit);
-        Session { run: None }
+        Session { page: Page::new(emit), run: None }
     }
 
     /// Follows a command. Failures are emitted as `error`; the result says whether there was none.
@@ -34,22 +34,19 @@ impl Session {
         #[wasm_bindgen(unchecked_param_type = "Command")] command: JsValue,
     ) -> bool {
         let done = self.follow(&command).await;
-        done.map_err(|f| emit(&Event::Error(f.0))).is_ok()
+        done.map_err(|f| self.page.emit(&Event::Error(f.0))).is_ok()
     }
 
-    /// Processes one frame; after the last one the map is refined. Says whether there is more.
+    /// Processes one frame; after the last one the map is refined. Returns whether there is more.
     pub async fn step(&mut self) -> bool {
-        let Some(run) = self.run.as_mut() else {
-            emit(&Event::Error(Failure::new(ErrorKind::Command, "nothing is open").0));
-            return false;
+        let step = match self.open_run() {
+            Ok(run) => run.step_and_save().await,
+            Err(f) => Err(f),
         };
-        match run.step_and_save().await {
-            Ok(more) => more,
-            Err(f) => {
-                emit(&Event::Error(f.0));
-                false
-            }
-        }
+        step.unwrap_or_else(|f| {
+            self.page.emit(&Event::Error(f.0));
+            false
+        })
     }
 
     async fn follow(&mut self, command: &JsValue) -> Result<(), Failure> {
@@ -61,10 +58,10 @@ impl Session {
                 let OpenCommand { source, settings, keep, resume } = parse(command, "open")?;
                 let run = match resume.dyn_into::<Uint8Array>() {
                     Ok(bytes) => {
-                        let saved = SavedRun::from_bytes(&bytes.to_vec())?;
-                        Run::resume(&source, settings, saved).await?
+                        let saved = saved_run(&bytes.to_vec())?;
+                        OpenRun::resume(&self.page, &source, settings, saved).await?
                     }
-                    Err(_) => Run::open(&source, settings).await?,
+                    Err(_) => OpenRun::open(&self.page, &source, settings).await?,
                 };
                 self.run.insert(run).keep = keep;
                 Ok(())
@@ -98,7 +95,7 @@ impl Session {
         }
     }
 
-    fn open_run(&mut self) -> Result<&mut Run, Failure> {
+    fn open_run(&mut self) -> Result<&mut OpenRun, Failure> {
         self.run.as_mut().ok_or_else(|| Failure::new(ErrorKind::Command, "nothing is open"))
     }
 }

@@ -1,23 +1,16 @@
 //! How a recording is processed: a preset, what differs from it, and what the page shows.
-use mte_slam_core::config::Config;
+use mte_slam_core::{
+    config::{Config, ConfigError},
+    settings::Value,
+};
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use std::collections::BTreeMap;
 use tsify::Tsify;
+use wasm_bindgen::prelude::wasm_bindgen;
 
-/// Names of the presets: those of the core, and `tiny` for processors and quick looks.
-pub const PRESETS: [&str; 5] = ["tiny", "fast", "replica", "scannet", "tum"];
-
-/// What differs from the preset `fast` in `tiny`.
-const TINY: [(&str, u32); 7] = [
-    ("mapping.rays", 600),
-    ("mapping.iterations", 6),
-    ("mapping.first_iterations", 60),
-    ("mapping.final_iterations", 20),
-    ("mapping.semantic_iterations", 120),
-    ("tracking.align_pixels", 1024),
-    ("sampling.stratified", 16),
-];
+/// `Preset` and `Overrides`, made of the core's settings; not part of the module itself.
+#[wasm_bindgen(typescript_custom_section)]
+const TYPES: &str = include_str!("settings.d.ts");
 
 /// Which engine computes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Tsify)]
@@ -47,17 +40,14 @@ pub enum LabelChoice {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Tsify)]
 #[serde(rename_all = "camelCase", default, deny_unknown_fields)]
 pub struct Settings {
-    /// One of [`PRESETS`].
-    #[tsify(optional)]
+    /// One of [`Config::PRESETS`].
+    #[tsify(optional, type = "Preset")]
     pub preset: String,
     /// Which engine computes.
     #[tsify(optional)]
     pub engine: EngineChoice,
-    /// Unrolled shaders: fast on hardware, slow to compile on software adapters.
-    #[tsify(optional)]
-    pub unroll: bool,
     /// `align`, `render` or `truth`; the preset's by default.
-    #[tsify(optional)]
+    #[tsify(optional, type = "Overrides[\"tracking.tracker\"]")]
     pub tracker: Option<String>,
     /// Where labels come from.
     #[tsify(optional)]
@@ -84,7 +74,7 @@ pub struct Settings {
     #[tsify(optional)]
     pub render_width: u32,
     /// Single values of the configuration by dotted path, such as `mapping.rays`.
-    #[tsify(optional, type = "Record<string, number | string | boolean>")]
+    #[tsify(optional, type = "Overrides")]
     pub overrides: BTreeMap<String, Value>,
 }
 
@@ -93,7 +83,6 @@ impl Default for Settings {
         Settings {
             preset: "fast".into(),
             engine: EngineChoice::Auto,
-            unroll: true,
             tracker: None,
             labels: LabelChoice::Dataset,
             start: 0,
@@ -118,10 +107,8 @@ impl Settings {
     /// # Errors
     /// Names the setting, what was found and what is expected.
     pub fn config(&self) -> Result<Config, SettingsError> {
-        let tiny = self.preset == "tiny";
-        let base = if tiny { "fast" } else { self.preset.as_str() };
-        let Some(preset) = Config::preset(base) else {
-            let (found, names) = (&self.preset, PRESETS.join(", "));
+        let Some(mut config) = Config::preset(&self.preset) else {
+            let (found, names) = (&self.preset, Config::PRESETS.join(", "));
             return wrong("preset", found, &format!("one of {names}"));
         };
         let positive = |name: &str, x: f64, max: f64| match x.is_finite() && x > 0.0 && x <= max {
@@ -133,45 +120,26 @@ impl Settings {
         if !(8..=1280).contains(&self.render_width) {
             return wrong("renderWidth", self.render_width, "8 to 1280");
         }
-        let failed = |e: serde_json::Error| SettingsError(format!("settings: {e}"));
-        let mut config = serde_json::to_value(&preset).map_err(failed)?;
-        for (path, value) in TINY.iter().filter(|_| tiny) {
-            set(&mut config, path, Value::from(*value))?;
-        }
         if let Some(tracker) = &self.tracker {
-            set(&mut config, "tracking.tracker", Value::from(tracker.as_str()))?;
+            config.set("tracking.tracker", tracker.as_str())?;
         }
         for (path, value) in &self.overrides {
-            set(&mut config, path, value.clone())?;
+            config.set(path, value.clone())?;
         }
-        let config: Config = serde_json::from_value(config).map_err(failed)?;
-        config.validate().map_err(|e| SettingsError(e.to_string()))?;
+        config.validate()?;
         Ok(config)
+    }
+}
+
+impl From<ConfigError> for SettingsError {
+    fn from(e: ConfigError) -> SettingsError {
+        SettingsError(format!("settings: {e}"))
     }
 }
 
 fn wrong<T>(name: &str, found: impl ToString, expected: &str) -> Result<T, SettingsError> {
     let found = found.to_string();
     Err(SettingsError(format!("settings: {name}: found {found}, expected {expected}")))
-}
-
-/// Replaces a value that is there by one of the same type.
-fn set(config: &mut Value, path: &str, value: Value) -> Result<(), SettingsError> {
-    let pointer = format!("/{}", path.replace('.', "/"));
-    let Some(old) = config.pointer_mut(&pointer) else {
-        return wrong(path, "no such setting", "a key of the configuration such as mapping.rays");
-    };
-    let same = match (&*old, &value) {
-        // A whole number stays whole; anything may go where a fraction may.
-        (Value::Number(a), Value::Number(b)) => a.is_f64() || !b.is_f64(),
-        (Value::String(_), Value::String(_)) | (Value::Bool(_), Value::Bool(_)) => true,
-        _ => false,
-    };
-    if !same {
-        return wrong(path, &value, &format!("a value like {old}"));
-    }
-    *old = value;
-    Ok(())
 }
 
 #[cfg(test)]
@@ -184,25 +152,30 @@ mod tests {
     }
 
     #[test]
-    fn every_preset_is_one_of_the_core_or_tiny() {
-        for preset in PRESETS {
+    fn the_page_offers_every_preset() {
+        let page = include_str!("../../www/index.html");
+        let list = page.split("id=\"preset\"").nth(1).and_then(|s| s.split("</select>").next());
+        let offered: Vec<&str> = { list.unwrap() }
+            .split("<option value=\"")
+            .skip(1)
+            .filter_map(|s| s.split('"').next())
+            .collect();
+        assert_eq!(offered, Config::PRESETS);
+        for preset in Config::PRESETS {
             let config = Settings { preset: preset.into(), ..Settings::default() }.config();
-            assert_eq!(config.unwrap() == Config::preset("fast").unwrap(), preset == "fast");
-        }
-        for core in Config::PRESETS {
-            assert!(PRESETS.contains(&core), "{core} cannot be chosen on the page");
+            assert_eq!(config.unwrap(), Config::preset(preset).unwrap());
         }
     }
 
     #[test]
     fn single_values_are_set_and_mistakes_named() {
-        assert_eq!(with("mapping.rays", 500.into()).unwrap().mapping.rays, 500);
-        assert_eq!(with("loss.color", 2.into()).unwrap().loss.color, 2.0);
+        assert_eq!(with("mapping.rays", 500u32.into()).unwrap().mapping.rays, 500);
+        assert_eq!(with("loss.color", 2u32.into()).unwrap().loss.color, 2.0);
         for (path, value, part) in [
-            ("mapping.rayz", 500.into(), "mapping.rayz"),
-            ("mapping", 500.into(), "mapping"),
+            ("mapping.rayz", 500u32.into(), "mapping.rayz"),
+            ("mapping", 500u32.into(), "mapping"),
             ("mapping.rays", 1.5.into(), "1.5"),
-            ("mapping.rays", 0.into(), "mapping.rays"),
+            ("mapping.rays", 0u32.into(), "mapping.rays"),
             ("mapping.rays", "many".into(), "many"),
             ("tracking.tracker", "laser".into(), "laser"),
         ] {

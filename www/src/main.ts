@@ -1,5 +1,5 @@
 // The page: wires controls, engine and view together. All computing happens in workers.
-import { MteSlam, type ErrorEvent, type ExportKind, type KeptRun, type OpenedEvent, type Settings, type SourceSpec } from "./client";
+import { MteSlam, type ErrorEvent, type ExportKind, type KeptRun, type OpenedEvent, type Overrides, type Settings, type SourceSpec } from "./client";
 import { bytes, element, paint, seconds, show } from "./ui/dom";
 import { type Action, type FailureKind, fail } from "./ui/failure";
 import { type About, about, engineOf, mine, offer, sourceOf } from "./ui/kept";
@@ -53,7 +53,6 @@ let awaited: KeptRun | undefined;
 let given: SourceSpec | undefined;
 let hasGpu = false;
 let gpuName = "";
-let software = false;
 
 // --- Running ---------------------------------------------------------------------------------
 
@@ -116,7 +115,7 @@ async function open(source: SourceSpec, choice: state.Choice, id?: string, start
   transport();
   progress();
   status("Opening the recording");
-  const settings: Settings = { unroll: !software, ...choice.settings };
+  const settings: Settings = { ...choice.settings };
   const keep = { id: run.id, about: about(source, choice), resume: id !== undefined };
   if (await slam.open(source, settings, keep)) {
     run.begunAt = performance.now();
@@ -189,7 +188,7 @@ function failed(kind: FailureKind, message: string, resumable: boolean): void {
 }
 
 /** What the paper adds, switched off and on where this build has it. */
-const SWITCHES: [path: string, name: string][] = [
+const SWITCHES: [path: keyof Overrides, name: string][] = [
   ["fusion.enabled", "Feature fusion (MTFF)"],
   ["suppressor.enabled", "Redundancy suppressor (FRS)"],
 ];
@@ -533,7 +532,7 @@ document.addEventListener("visibilitychange", () => {
   if (!document.hidden && run.running) note("Mapping went on while this tab was hidden, as far as the browser lets it.");
 });
 
-/** What this browser can compute with; software adapters get shaders without unrolled loops. */
+/** What this browser can compute with. */
 async function lookForGpu(): Promise<void> {
   const place = element("gpu-note");
   try {
@@ -542,7 +541,7 @@ async function lookForGpu(): Promise<void> {
     hasGpu = adapter !== null && adapter !== undefined;
     const name = about?.description || [about?.vendor, about?.architecture].filter(Boolean).join(" ");
     gpuName = name;
-    software = /swiftshader|llvmpipe|software/i.test(name) || about?.isFallbackAdapter === true;
+    const software = /swiftshader|llvmpipe|software/i.test(name) || about?.isFallbackAdapter === true;
     place.textContent = !hasGpu
       ? "No WebGPU here: the processor computes, so choose Tiny and small images."
       : software

@@ -82,7 +82,7 @@ test("no WebGPU, and adapters that refuse, are too small, or go away", { timeout
   const page = await visit(`${QUICK}&source=room&frames=3`.replace("engine=cpu", "engine=gpu"));
   const patch = (code) => Promise.all(page.workers().map((w) => w.evaluate(code)));
   const begin = () => dismiss(page).then(() => page.evaluate(() => window.mteSlam.slam.open({ kind: "built-in", scene: "room", frames: 3, width: 64, noise: false },
-    { engine: "gpu", preset: "tiny", unroll: false, renderEvery: 0, overrides: { "mapping.rays": 128, "mapping.first_iterations": 4 } }).then((ok) => ok && window.mteSlam.slam.start())));
+    { engine: "gpu", preset: "tiny", renderEvery: 0, overrides: { "mapping.rays": 128, "mapping.first_iterations": 4 } }).then((ok) => ok && window.mteSlam.slam.start())));
 
   await patch(() => {
     self.realGpu = Object.getOwnPropertyDescriptor(WorkerNavigator.prototype, "gpu");

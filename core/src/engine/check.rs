@@ -1,6 +1,6 @@
-//! Buffer tables and the checks that both engines make before they run a recording.
+//! Buffer tables and the checks that both engines make before they run commands.
 use super::EngineError;
-use crate::recording::{BufferId, Command, MAX_WORKGROUPS_PER_DIMENSION, Recording};
+use crate::commands::{BufferId, Command, Commands, MAX_WORKGROUPS_PER_DIMENSION};
 use alloc::{format, string::String, vec::Vec};
 
 /// Sizes are rounded up to this many words, so that arrays of 4-vectors can be bound; never 0.
@@ -72,7 +72,7 @@ impl<T> Table<T> {
         entry.ok_or_else(|| EngineError::UnknownBuffer { operation: operation(), id })
     }
 
-    /// The buffer for writing, once the recording has been checked.
+    /// The buffer for writing, once the commands have been checked.
     pub fn get_mut(&mut self, id: BufferId) -> Option<&mut T> {
         let entry = self.entries.get_mut(id.0 as usize)?.as_mut()?;
         Some(&mut entry.data)
@@ -99,9 +99,9 @@ impl<T> Table<T> {
         }
     }
 
-    /// Refuses a recording with any mistake in it.
-    pub fn check(&self, recording: &Recording) -> Result<(), EngineError> {
-        recording.commands.iter().try_for_each(|command| self.check_command(command))
+    /// Refuses commands with any mistake among them.
+    pub fn check(&self, commands: &Commands) -> Result<(), EngineError> {
+        commands.list.iter().try_for_each(|command| self.check_command(command))
     }
 
     fn check_command(&self, command: &Command) -> Result<(), EngineError> {
@@ -120,31 +120,31 @@ impl<T> Table<T> {
                 }
             }
             Command::Dispatch { kernel, ref bindings, ref params, workgroups } => {
-                let name = kernel.name;
-                if bindings.len() != kernel.bindings.len() {
+                let name = kernel.interface.name;
+                if bindings.len() != kernel.interface.bindings.len() {
                     return Err(EngineError::BindingCount {
                         kernel: name,
-                        expected: kernel.bindings.len(),
+                        expected: kernel.interface.bindings.len(),
                         found: bindings.len(),
                     });
                 }
                 for (i, id) in bindings.iter().enumerate() {
                     let entry = self.get(*id, || {
-                        format!("kernel {name}, binding {}", kernel.bindings[i].name)
+                        format!("kernel {name}, binding {}", kernel.interface.bindings[i].name)
                     })?;
                     if let Some(first) = bindings[..i].iter().position(|other| other == id) {
                         return Err(EngineError::BoundTwice {
                             kernel: name,
                             buffer: entry.name,
-                            first: kernel.bindings[first].name,
-                            second: kernel.bindings[i].name,
+                            first: kernel.interface.bindings[first].name,
+                            second: kernel.interface.bindings[i].name,
                         });
                     }
                 }
-                if 4 * params.len() != kernel.params.size {
+                if 4 * params.len() != kernel.interface.params.size {
                     return Err(EngineError::ParamsSize {
                         kernel: name,
-                        expected: kernel.params.size,
+                        expected: kernel.interface.params.size,
                         found: 4 * params.len(),
                     });
                 }

@@ -4,13 +4,14 @@ use super::{
     check::{Table, allocated_words, buffer_size},
 };
 use crate::{
-    kernels::{Access, CpuBinding, CpuDispatch, Kernel},
-    recording::{BufferId, Command, Recording},
+    commands::{BufferId, Command, Commands},
+    kernel::{CpuBinding, CpuDispatch, Kernel},
 };
 use alloc::{string::ToString, vec, vec::Vec};
 use core::sync::atomic::AtomicU32;
+use mte_slam_shaders::interface::Access;
 
-/// Runs recordings on the processor, in parallel over workgroups with `std`. It needs no adapter
+/// Runs commands on the processor, in parallel over workgroups with the feature `threads`. It needs no adapter
 /// and is the oracle of the kernels' tests.
 pub struct CpuEngine {
     buffers: Table<Vec<u32>>,
@@ -44,9 +45,9 @@ impl CpuEngine {
     }
 
     /// See [`Engine::submit`](super::Engine::submit).
-    pub fn submit(&mut self, recording: &Recording) -> Result<(), EngineError> {
-        self.buffers.check(recording)?;
-        for command in &recording.commands {
+    pub fn submit(&mut self, commands: &Commands) -> Result<(), EngineError> {
+        self.buffers.check(commands)?;
+        for command in &commands.list {
             self.run(command);
         }
         Ok(())
@@ -95,13 +96,18 @@ impl CpuEngine {
             .collect();
         let bound = taken
             .iter_mut()
-            .zip(kernel.bindings)
+            .zip(kernel.interface.bindings)
             .map(|(words, binding)| match binding.access {
                 Access::Read => CpuBinding::Read(words),
-                Access::ReadWrite => CpuBinding::ReadWrite(as_atomics(words)),
+                Access::ReadWrite | Access::Atomic => CpuBinding::ReadWrite(as_atomics(words)),
             })
             .collect();
-        (kernel.twin)(&CpuDispatch::new(workgroups, kernel.workgroup_size, params, bound));
+        (kernel.twin)(&CpuDispatch::new(
+            workgroups,
+            kernel.interface.workgroup_size,
+            params,
+            bound,
+        ));
         for (id, words) in bindings.iter().zip(taken) {
             if let Some(slot) = self.buffers.get_mut(*id) {
                 *slot = words;

@@ -10,12 +10,12 @@ use super::{
     oneshot,
 };
 use crate::{
-    kernels::{Access, Kernel},
-    recording::{BufferId, Command, Recording},
-    shader,
+    commands::{BufferId, Command, Commands},
+    kernel::Kernel,
 };
 use alloc::{collections::BTreeMap, format, string::String, sync::Arc, vec::Vec};
 use core::num::NonZeroU64;
+use mte_slam_shaders::{interface::Access, shader};
 use std::sync::Mutex;
 
 /// How to make a [`GpuEngine`].
@@ -48,7 +48,7 @@ struct Failures {
     lost: Option<String>,
 }
 
-/// Runs recordings on a graphics adapter with no more than WebGPU's default limits. Stays on the
+/// Runs commands on a graphics adapter with no more than WebGPU's default limits. Stays on the
 /// thread that made it on the web.
 pub struct GpuEngine {
     device: wgpu::Device,
@@ -123,7 +123,7 @@ impl GpuEngine {
             result?;
             if let Some(error) = error {
                 self.kernels.remove(&address(kernel));
-                let message = format!("kernel {}: {error}", kernel.name);
+                let message = format!("kernel {}: {error}", kernel.interface.name);
                 return Err(EngineError::Validation { message });
             }
         }
@@ -163,16 +163,16 @@ impl GpuEngine {
     }
 
     /// See [`Engine::submit`](super::Engine::submit).
-    pub fn submit(&mut self, recording: &Recording) -> Result<(), EngineError> {
+    pub fn submit(&mut self, commands: &Commands) -> Result<(), EngineError> {
         self.check_failures()?;
-        self.buffers.check(recording)?;
-        for command in &recording.commands {
+        self.buffers.check(commands)?;
+        for command in &commands.list {
             if let Command::Dispatch { kernel, bindings, .. } = command {
                 self.compile(kernel)?;
                 self.bind(kernel, bindings)?;
             }
         }
-        self.encode(recording)?;
+        self.encode(commands)?;
         self.check_failures()
     }
 
@@ -288,9 +288,9 @@ impl GpuEngine {
         if self.kernels.contains_key(&address(kernel)) {
             return Ok(());
         }
-        let source = shader::compose(kernel, &self.overrides)?;
+        let source = shader::compose(kernel.interface, &self.overrides)?;
         let device = &self.device;
-        let label = Some(kernel.name);
+        let label = Some(kernel.interface.name);
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label,
             source: wgpu::ShaderSource::Wgsl(source.into()),
@@ -305,7 +305,7 @@ impl GpuEngine {
         let params_size = NonZeroU64::new(params_bytes(kernel));
         let mut entries =
             alloc::vec![entry(0, wgpu::BufferBindingType::Uniform, true, params_size)];
-        entries.extend(kernel.bindings.iter().zip(1..).map(|(binding, number)| {
+        entries.extend(kernel.interface.bindings.iter().zip(1..).map(|(binding, number)| {
             let read_only = binding.access == Access::Read;
             entry(number, wgpu::BufferBindingType::Storage { read_only }, false, None)
         }));
@@ -349,11 +349,12 @@ impl GpuEngine {
             }),
         }];
         for (id, binding) in bindings.iter().zip(1..) {
-            let buffer = &self.buffers.get(*id, || format!("kernel {}", kernel.name))?.data;
+            let buffer =
+                &self.buffers.get(*id, || format!("kernel {}", kernel.interface.name))?.data;
             entries.push(wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() });
         }
         let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some(kernel.name),
+            label: Some(kernel.interface.name),
             layout: &compiled.layout,
             entries: &entries,
         });
@@ -369,7 +370,7 @@ fn address(kernel: &'static Kernel) -> usize {
 
 /// Size of a kernel's uniform binding: WGSL rounds structs with 4-vectors up to 16 bytes.
 fn params_bytes(kernel: &Kernel) -> u64 {
-    (kernel.params.size as u64).next_multiple_of(16).max(16)
+    (kernel.interface.params.size as u64).next_multiple_of(16).max(16)
 }
 
 /// Collects what wgpu reports by callbacks.

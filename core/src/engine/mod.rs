@@ -1,4 +1,4 @@
-//! Engines that run recordings: the CPU engine (Rust twins) and the GPU engine (wgpu).
+//! Engines that run commands: the CPU engine (Rust twins) and the GPU engine (wgpu).
 mod check;
 mod cpu;
 #[cfg(feature = "gpu")]
@@ -10,12 +10,10 @@ pub use cpu::CpuEngine;
 #[cfg(feature = "gpu")]
 pub use gpu::{AdapterDescription, GpuEngine, GpuOptions, list_adapters};
 
-use crate::{
-    recording::{BufferId, Recording},
-    shader::ShaderError,
-};
+use crate::commands::{Buffer, BufferId, Commands};
 use alloc::{string::String, vec::Vec};
 use bytemuck::Pod;
+use mte_slam_shaders::shader::ShaderError;
 
 /// Largest buffer \[bytes\]: the storage binding that WebGPU grants everywhere.
 pub const MAX_BUFFER_BYTES: u64 = 128 << 20;
@@ -129,7 +127,7 @@ pub enum EngineError {
     },
     /// More workgroups than a dispatch may have.
     #[error(
-        "kernel {kernel}: {workgroups:?} workgroups, the limit is 65535 a dimension and 2^32 - 1 \
+        "kernel {kernel}: {workgroups:?} workgroups, the limit is 65535 per dimension and 2^32 - 1 \
          in all"
     )]
     TooManyWorkgroups {
@@ -194,7 +192,7 @@ pub struct EngineInfo {
     pub driver: String,
 }
 
-/// Runs recordings. Both kinds accept and refuse the same recordings.
+/// Runs commands. Both kinds accept and refuse the same ones.
 pub enum Engine {
     /// The kernels' Rust twins.
     Cpu(CpuEngine),
@@ -236,24 +234,36 @@ impl Engine {
         either!(self, engine => engine.create_buffer(name, words))
     }
 
+    /// As [`create_buffer`](Self::create_buffer), of a buffer that holds elements of `T`. The size is
+    /// in words all the same.
+    pub fn create<T>(
+        &mut self,
+        name: &'static str,
+        words: usize,
+    ) -> Result<Buffer<T>, EngineError> {
+        self.create_buffer(name, words).map(Buffer::new)
+    }
+
     /// Frees a buffer; unknown names are ignored.
-    pub fn destroy_buffer(&mut self, buffer: BufferId) {
+    pub fn destroy_buffer(&mut self, buffer: impl Into<BufferId>) {
+        let buffer = buffer.into();
         either!(self, engine => engine.destroy_buffer(buffer))
     }
 
-    /// Runs a recording, in order. A recording with a mistake is refused as a whole. On the GPU
+    /// Runs commands, in order. With a mistake in one of them all are refused. On the GPU
     /// this returns before the work is done, and failures of earlier work may be reported here.
-    pub fn submit(&mut self, recording: &Recording) -> Result<(), EngineError> {
-        either!(self, engine => engine.submit(recording))
+    pub fn submit(&mut self, commands: &Commands) -> Result<(), EngineError> {
+        either!(self, engine => engine.submit(commands))
     }
 
     /// Reads words back after all submitted work.
     pub async fn read(
         &mut self,
-        buffer: BufferId,
+        buffer: impl Into<BufferId>,
         offset_words: usize,
         words: usize,
     ) -> Result<Vec<u32>, EngineError> {
+        let buffer = buffer.into();
         match self {
             Engine::Cpu(engine) => engine.read(buffer, offset_words, words),
             #[cfg(feature = "gpu")]
@@ -264,7 +274,7 @@ impl Engine {
     /// Reads `count` elements from word `offset_words` on, after all submitted work.
     pub async fn read_as<T: Pod>(
         &mut self,
-        buffer: BufferId,
+        buffer: impl Into<BufferId>,
         offset_words: usize,
         count: usize,
     ) -> Result<Vec<T>, EngineError> {

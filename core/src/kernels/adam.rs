@@ -1,6 +1,8 @@
 //! Sparse Adam: one step on the parameters whose gradient is not zero.
-use super::{CpuDispatch, load_f32, load_i32, load_u32, or_u32, store_f32, store_u32};
-use crate::recording::{BufferId, Recording};
+pub use mte_slam_shaders::kernels::adam::AdamParams;
+
+use crate::kernel::{CpuDispatch, load_f32, load_i32, load_u32, or_u32, store_f32, store_u32};
+use crate::{call::Call, commands::Commands};
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
@@ -12,60 +14,16 @@ pub const STATUS_NOT_FINITE: u32 = 2;
 /// Moments smaller than this become 0: denormal numbers are slow on CPUs and unspecified on GPUs.
 const TINY: f32 = 1e-30;
 
-params! {
-    /// Parameters of [`ADAM`].
-    pub struct AdamParams {
-        /// First parameter to update, an index into all buffers but `status`.
-        offset: u32,
-        /// Number of parameters to update from `offset` on.
-        count: u32,
-        /// 1: `gradient` holds fixed-point i32; 0: f32.
-        fixed_point: u32,
-        /// Fixed-point gradients beyond this are skipped and set [`STATUS_SATURATED`].
-        gradient_limit: i32,
-        /// The gradient is the stored value times this.
-        gradient_scale: f32,
-        /// Step size.
-        learning_rate: f32,
-        /// Decay of the first moment.
-        beta1: f32,
-        /// Decay of the second moment.
-        beta2: f32,
-        /// Added to the root of the second moment.
-        epsilon: f32,
-        /// 1 / (1 - beta1^t).
-        correction1: f32,
-        /// 1 / (1 - beta2^t).
-        correction2: f32,
-    }
-}
-
-kernel! {
-    /// One Adam step. As in Instant-NGP, parameters with zero gradient are left alone together
-    /// with their moments; after use the gradient is set to 0.
-    pub static ADAM = "adam" {
-        workgroup_size: 256,
-        params: AdamParams,
-        twin: twin,
-        bindings: [
-            parameters: ReadWrite,
-            gradient: ReadWrite,
-            moment1: ReadWrite,
-            moment2: ReadWrite,
-            status: ReadWrite,
-        ],
-    }
-}
+kernel! { pub static ADAM = mte_slam_shaders::kernels::adam, twin }
 
 /// Parameters that [`record`] leaves to one invocation. With a tenth of the gradients not zero, a
 /// software adapter takes a quarter of the time that one parameter an invocation takes.
 const PARAMETERS_PER_INVOCATION: usize = 32;
 
-/// Records a step. `bindings` are those of [`ADAM`]. Any number of workgroups gives the same
-/// result; this one is quick.
-pub fn record(recording: &mut Recording, params: &AdamParams, bindings: &[BufferId]) {
+/// Records a step. Any number of workgroups gives the same result; this one is quick.
+pub fn record(commands: &mut Commands, params: &AdamParams, buffers: Buffers) {
     let invocations = (params.count as usize).div_ceil(PARAMETERS_PER_INVOCATION);
-    recording.dispatch_1d(&ADAM, params, bindings, invocations);
+    buffers.record(commands, params, invocations);
 }
 
 /// The bits of a NaN or an infinity.
@@ -79,8 +37,7 @@ fn flush(x: f32) -> f32 {
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: AdamParams = dispatch.params();
-    let (parameters, gradient) = (dispatch.write(0), dispatch.write(1));
-    let (moment1, moment2, status) = (dispatch.write(2), dispatch.write(3), dispatch.write(4));
+    let Views { parameters, gradient, moment1, moment2, status } = dispatch.views();
     let update = |i: usize| {
         let bits = load_u32(&gradient[i]);
         let g = if p.fixed_point == 1 {

@@ -1,9 +1,9 @@
-//! Normal equations of aligning a depth image to the field, one look-up a pixel.
+//! Normal equations of aligning a depth image to the field, one look-up per pixel.
 use super::shared::{
     Grid, color_backward, color_hidden, color_output, cross, geometry_decoder, geometry_deltas,
     geometry_feature_gradient, surface_weights,
 };
-use super::{CpuDispatch, store_f32};
+use crate::kernel::{CpuDispatch, store_f32};
 use crate::layout::FieldParams;
 
 /// Floats a workgroup writes.
@@ -11,30 +11,18 @@ pub const ALIGN_ROW: usize = 32;
 /// Rec. 601 luma.
 pub const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
 
-kernel! {
-    /// Sums of a Gauss-Newton step on the pose (left retraction): 21 of the upper triangle, 6 of
-    /// the gradient, weighted squares of both residuals, points, absolute residuals.
-    pub static ALIGN_POINTS = "align_points" {
-        workgroup_size: 64,
-        params: FieldParams,
-        twin: twin,
-        bindings: [
-            poses: Read,
-            pixels: Read,
-            planes_geometry: Read,
-            planes_appearance: Read,
-            decoders: Read,
-            partials: ReadWrite,
-        ],
-    }
-}
+kernel! { pub static ALIGN_POINTS = mte_slam_shaders::kernels::align_points, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let (poses, pixels) = (dispatch.read_f32(0), dispatch.read_f32(1));
-    let (geometry, appearance) = (dispatch.read_f32(2), dispatch.read_f32(3));
-    let decoders = dispatch.read_f32(4);
-    let partials = dispatch.write(5);
+    let Views {
+        poses,
+        pixels,
+        planes_geometry: geometry,
+        planes_appearance: appearance,
+        decoders,
+        partials,
+    } = dispatch.views();
     let (grid, surface_grid) = (Grid::geometry(&p), Grid::surface(&p));
     let surface = surface_weights(decoders);
     dispatch.for_each_workgroup(|group| {

@@ -1,25 +1,15 @@
 //! Gradients of the attention at its keys and values.
 use super::{
-    CpuDispatch,
     attend_tokens::{Pairs, columns},
-    load_f32, store_f32,
     tokens::{TILE, TokenParams, sixteen},
 };
+use crate::kernel::{CpuDispatch, load_f32, store_f32};
 
-kernel! {
-    /// Adds dL/dK and dL/dV. After `attend_queries`.
-    pub static ATTEND_KEYS = "attend_keys" {
-        workgroup_size: 64,
-        params: TokenParams,
-        twin: twin,
-        bindings: [tokens: Read, token_gradient: ReadWrite],
-    }
-}
+kernel! { pub static ATTEND_KEYS = mte_slam_shaders::kernels::attend_keys, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: TokenParams = dispatch.params();
-    let tokens = dispatch.read_f32(0);
-    let gradient = dispatch.write(1);
+    let Views { tokens, token_gradient: gradient } = dispatch.views();
     let (stride, query) = (p.stride as usize, p.query as usize);
     dispatch.for_each_workgroup(|group| {
         let first = group as usize * TILE;

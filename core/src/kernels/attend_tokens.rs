@@ -1,22 +1,12 @@
 //! Cross-attention over the tokens of an image, streamed over tiles (paper eqs. 1-4).
-use super::{
-    CpuDispatch, load_f32, store_f32,
-    tokens::{NO_RESIDUAL, TILE, TokenParams, exp_negative, sixteen},
-};
+use super::tokens::{NO_RESIDUAL, TILE, TokenParams, exp_negative, sixteen};
+use crate::kernel::{CpuDispatch, load_f32, store_f32};
 
-kernel! {
-    /// softmax(Q K^T / 4) V, and the log-sum-exp for the backward pass.
-    pub static ATTEND_TOKENS = "attend_tokens" {
-        workgroup_size: 64,
-        params: TokenParams,
-        twin: twin,
-        bindings: [tokens: ReadWrite],
-    }
-}
+kernel! { pub static ATTEND_TOKENS = mte_slam_shaders::kernels::attend_tokens, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: TokenParams = dispatch.params();
-    let tokens = dispatch.write(0);
+    let Views { tokens } = dispatch.views();
     let (stride, query) = (p.stride as usize, p.query as usize);
     dispatch.for_each_workgroup(|group| {
         let first = group as usize * TILE;

@@ -1,39 +1,28 @@
 //! Interval weights, composited depth, opacity and features.
-use super::shared::{FLAG_DENSE, FLAG_MAP, FLAG_POSE, Grid, Ray, interval_alpha, phi};
-use super::{CpuDispatch, load_f32, store_f32};
+use super::shared::{FLAG_DENSE, FLAG_MAP, FLAG_POSE, Grid, interval_alpha, phi};
+use crate::kernel::{CpuDispatch, load_f32, store_f32};
 use crate::layout::{FieldParams, RAY_STATE_FLOATS, STATE_APPEARANCE, STATE_DEPTH, STATE_SEMANTIC};
 
-kernel! {
-    /// Weights of a ray's intervals (NeuS), composited depth, opacity and features.
-    pub static COMPOSITE = "composite" {
-        workgroup_size: 64,
-        params: FieldParams,
-        twin: twin,
-        bindings: [
-            rays: Read,
-            depths: Read,
-            distances: Read,
-            planes_appearance: Read,
-            planes_semantic: Read,
-            weights: ReadWrite,
-            ray_state: ReadWrite,
-        ],
-    }
-}
+kernel! { pub static COMPOSITE = mte_slam_shaders::kernels::composite, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let (rays, depths, distances) =
-        (dispatch.read_f32(0), dispatch.read_f32(1), dispatch.read_f32(2));
-    let (appearance_planes, semantic_planes) = (dispatch.read_f32(3), dispatch.read_f32(4));
-    let (weights, ray_state) = (dispatch.write(5), dispatch.write(6));
+    let Views {
+        rays,
+        depths,
+        distances,
+        planes_appearance: appearance_planes,
+        planes_semantic: semantic_planes,
+        weights,
+        ray_state,
+    } = dispatch.views();
     let grid = Grid::surface(&p);
     let n = p.samples as usize;
     dispatch.for_each_invocation(|id| {
         if id >= p.rays as usize {
             return;
         }
-        let ray = Ray::load(rays, id);
+        let ray = rays[id];
         let base = id * n;
         let (mut appearance, mut semantic) = ([0.0_f32; 32], [0.0_f32; 32]);
         let (mut transmittance, mut depth, mut opacity) = (1.0, 0.0, 0.0);

@@ -1,36 +1,25 @@
 //! Gradients at the signed distances: through the interval weights, and the distance losses.
-use super::shared::{FLAG_POSE, Grid, Ray, cross, phi};
-use super::{CpuDispatch, load_f32, store_f32};
+use super::shared::{FLAG_POSE, Grid, cross, phi};
+use crate::kernel::{CpuDispatch, load_f32, store_f32};
 use crate::layout::{
     FieldParams, RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_APPEARANCE_GRADIENT, STATE_DEPTH,
     STATE_POSE,
 };
 
-kernel! {
-    /// Gradients at the signed distances of each ray, and the distance loss.
-    pub static COMPOSITE_BACKWARD = "composite_backward" {
-        workgroup_size: 64,
-        params: FieldParams,
-        twin: twin,
-        bindings: [
-            rays: Read,
-            depths: Read,
-            distances: Read,
-            weights: Read,
-            planes_appearance: Read,
-            ray_state: ReadWrite,
-            ray_out: ReadWrite,
-            distance_gradient: ReadWrite,
-        ],
-    }
-}
+kernel! { pub static COMPOSITE_BACKWARD = mte_slam_shaders::kernels::composite_backward, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let (rays, depths) = (dispatch.read_f32(0), dispatch.read_f32(1));
-    let (distances, weights) = (dispatch.read_f32(2), dispatch.read_f32(3));
-    let planes = dispatch.read_f32(4);
-    let (ray_state, ray_out, gradient) = (dispatch.write(5), dispatch.write(6), dispatch.write(7));
+    let Views {
+        rays,
+        depths,
+        distances,
+        weights,
+        planes_appearance: planes,
+        ray_state,
+        ray_out,
+        distance_gradient: gradient,
+    } = dispatch.views();
     let grid = Grid::surface(&p);
     let n = p.samples as usize;
     let inv_rays = 1.0 / p.rays as f32;
@@ -38,7 +27,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         if id >= p.rays as usize {
             return;
         }
-        let ray = Ray::load(rays, id);
+        let ray = rays[id];
         let (z, s) = (&depths[id * n..(id + 1) * n], &distances[id * n..(id + 1) * n]);
         let w = &weights[id * n..(id + 1) * n];
         let state = &ray_state[id * RAY_STATE_FLOATS..(id + 1) * RAY_STATE_FLOATS];

@@ -1,10 +1,10 @@
-//! Decoders and class head on composited features; the losses of colour, classes, feature and
+//! Decoders and class head on composited features; the losses of color, classes, feature and
 //! compression; their gradients.
 use super::shared::{
     FLAG_ANCHORS, Ray, class_logit, color_backward, color_hidden, color_output, head_row,
     likeliest_class, semantic_backward, semantic_hidden, semantic_output, surface_weights,
 };
-use super::{CpuDispatch, load_f32, store_f32, store_u32};
+use crate::kernel::{CpuDispatch, load_f32, store_f32, store_u32};
 use crate::layout::{
     ANCHOR_FLOATS, FieldParams, NO_ANCHOR, NO_DISTANCE, RAY_OUT_FLOATS, RAY_STATE_FLOATS,
     STATE_ANCHOR, STATE_APPEARANCE, STATE_APPEARANCE_GRADIENT, STATE_COLOR_DELTA,
@@ -14,24 +14,7 @@ use crate::layout::{
 };
 use core::sync::atomic::AtomicU32;
 
-kernel! {
-    /// Colour, semantic feature and classes of each ray; losses; gradients at the features.
-    pub static DECODE_RAYS = "decode_rays" {
-        workgroup_size: 64,
-        params: FieldParams,
-        twin: twin,
-        bindings: [
-            rays: Read,
-            decoders: Read,
-            ray_state: ReadWrite,
-            ray_out: ReadWrite,
-            logits_gradient: ReadWrite,
-            anchors: Read,
-            targets: Read,
-            class_weights: Read,
-        ],
-    }
-}
+kernel! { pub static DECODE_RAYS = mte_slam_shaders::kernels::decode_rays, twin }
 
 fn put(state: &[AtomicU32], at: u32, values: &[f32]) {
     for (k, v) in values.iter().enumerate() {
@@ -116,17 +99,23 @@ fn fused_target<'a>(p: &FieldParams, targets: &'a [f32], ray: &Ray) -> Option<&'
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let (rays, decoders) = (dispatch.read_f32(0), dispatch.read_f32(1));
-    let (ray_state, ray_out, logits) = (dispatch.write(2), dispatch.write(3), dispatch.write(4));
-    let (anchors, targets) = (dispatch.read_f32(5), dispatch.read_f32(6));
-    let class_weights = dispatch.read_f32(7);
+    let Views {
+        rays,
+        decoders,
+        ray_state,
+        ray_out,
+        logits_gradient: logits,
+        anchors,
+        targets,
+        class_weights,
+    } = dispatch.views();
     let surface = surface_weights(decoders);
     let inv_rays = 1.0 / p.rays as f32;
     dispatch.for_each_invocation(|id| {
         if id >= p.rays as usize {
             return;
         }
-        let ray = Ray::load(rays, id);
+        let ray = rays[id];
         let state = &ray_state[id * RAY_STATE_FLOATS..(id + 1) * RAY_STATE_FLOATS];
         let [depth, opacity, _, range] = get::<4>(state, STATE_DEPTH);
 

@@ -1,28 +1,17 @@
-//! Raw features of each patch of an image: geometry, colours, class histogram.
+//! Raw features of each patch of an image: geometry, colors, class histogram.
 use super::{
-    CpuDispatch, load_f32,
     shared::{Vec3, cross, sin_cos},
-    store_f32,
     tokens::{BANDS, RAW_GEOMETRY, RAW_HISTOGRAM, RAW_MEAN, RAW_PATCH, RAW_POINT, TokenParams},
 };
+use crate::kernel::{CpuDispatch, load_f32, store_f32};
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
-kernel! {
-    /// Geometry encoding, patch and label histogram of each token of a stored frame.
-    pub static EXTRACT_TOKENS = "extract_tokens" {
-        workgroup_size: 64,
-        params: TokenParams,
-        twin: twin,
-        bindings: [poses: Read, color_images: Read, depth_images: Read, raw: ReadWrite],
-    }
-}
+kernel! { pub static EXTRACT_TOKENS = mte_slam_shaders::kernels::extract_tokens, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: TokenParams = dispatch.params();
-    let poses = dispatch.read_f32(0);
-    let (colors, depths) = (dispatch.read_u32(1), dispatch.read_u32(2));
-    let raw = dispatch.write(3);
+    let Views { poses, color_images: colors, depth_images: depths, raw } = dispatch.views();
     let pixels = p.width * p.height;
     let pose = &poses[p.slot as usize * 12..p.slot as usize * 12 + 12];
     let color = |u: u32, v: u32| colors[(p.slot * pixels + v * p.width + u) as usize];

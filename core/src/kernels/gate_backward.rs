@@ -1,26 +1,16 @@
 //! Gradients through the gating.
 use super::{
-    CpuDispatch,
     attend_tokens::columns,
     gate_tokens::sigmoid,
-    load_f32, store_f32,
     tokens::{FUSED_AT, GATE_AT, GEOMETRY_AT, TokenParams, dot, sixteen},
 };
+use crate::kernel::{CpuDispatch, load_f32, store_f32};
 
-kernel! {
-    /// From dL/dF to the gate's convolution and the three modalities.
-    pub static GATE_BACKWARD = "gate_backward" {
-        workgroup_size: 64,
-        params: TokenParams,
-        twin: twin,
-        bindings: [tokens: Read, token_gradient: ReadWrite],
-    }
-}
+kernel! { pub static GATE_BACKWARD = mte_slam_shaders::kernels::gate_backward, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: TokenParams = dispatch.params();
-    let tokens = dispatch.read_f32(0);
-    let gradient = dispatch.write(1);
+    let Views { tokens, token_gradient: gradient } = dispatch.views();
     dispatch.for_each_invocation(|token| {
         if token >= p.tokens() {
             return;

@@ -1,18 +1,8 @@
 //! Normalised gating and fusion of the three modalities (paper eqs. 7, 8).
-use super::{
-    CpuDispatch, load_f32, store_f32,
-    tokens::{FUSED_AT, GATE_AT, GEOMETRY_AT, TokenParams, sixteen},
-};
+use super::tokens::{FUSED_AT, GATE_AT, GEOMETRY_AT, TokenParams, sixteen};
+use crate::kernel::{CpuDispatch, load_f32, store_f32};
 
-kernel! {
-    /// Sigmoids of the gate's convolution, normalised to sum 1; F = the gated sum of G, S^, T_a.
-    pub static GATE_TOKENS = "gate_tokens" {
-        workgroup_size: 64,
-        params: TokenParams,
-        twin: twin,
-        bindings: [tokens: ReadWrite],
-    }
-}
+kernel! { pub static GATE_TOKENS = mte_slam_shaders::kernels::gate_tokens, twin }
 
 pub(super) fn sigmoid(x: f32) -> f32 {
     1.0 / (1.0 + libm::expf(-x))
@@ -20,7 +10,7 @@ pub(super) fn sigmoid(x: f32) -> f32 {
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: TokenParams = dispatch.params();
-    let tokens = dispatch.write(0);
+    let Views { tokens } = dispatch.views();
     dispatch.for_each_invocation(|token| {
         if token >= p.tokens() {
             return;

@@ -1,34 +1,23 @@
 //! From gradients at the signed distances to gradients at features and positions.
 use super::shared::{
-    FLAG_MAP, FLAG_POSE, Grid, Ray, geometry_decoder, geometry_deltas, geometry_feature_gradient,
+    FLAG_MAP, FLAG_POSE, Grid, geometry_decoder, geometry_deltas, geometry_feature_gradient,
 };
-use super::{CpuDispatch, load_f32, store_f32};
+use crate::kernel::{CpuDispatch, load_f32, store_f32};
 use crate::layout::{BACKWARD_STRIP, FieldParams};
 
-kernel! {
-    /// Gradients at the plane features (over the features) and at the sample positions.
-    pub static GEOMETRY_BACKWARD = "geometry_backward" {
-        workgroup_size: 64,
-        params: FieldParams,
-        twin: twin,
-        bindings: [
-            rays: Read,
-            depths: Read,
-            planes_geometry: Read,
-            decoders: Read,
-            distance_gradient: Read,
-            features: ReadWrite,
-            position_gradient: ReadWrite,
-        ],
-    }
-}
+kernel! { pub static GEOMETRY_BACKWARD = mte_slam_shaders::kernels::geometry_backward, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let (rays, depths) = (dispatch.read_f32(0), dispatch.read_f32(1));
-    let (planes, decoders, gradient) =
-        (dispatch.read_f32(2), dispatch.read_f32(3), dispatch.read_f32(4));
-    let (features, positions) = (dispatch.write(5), dispatch.write(6));
+    let Views {
+        rays,
+        depths,
+        planes_geometry: planes,
+        decoders,
+        distance_gradient: gradient,
+        features,
+        position_gradient: positions,
+    } = dispatch.views();
     let grid = Grid::geometry(&p);
     let count = (p.rays * p.samples) as usize;
     let one = |sample: usize| {
@@ -42,7 +31,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             let d = geometry_deltas(decoders, &s, gradient[sample]);
             f = geometry_feature_gradient(decoders, &d);
             if p.flags & FLAG_POSE != 0 {
-                let ray = Ray::load(rays, sample / p.samples as usize);
+                let ray = rays[sample / p.samples as usize];
                 dp = grid.lookup_gradient(planes, ray.at(depths[sample]), &f);
             }
         }

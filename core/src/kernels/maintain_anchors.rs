@@ -1,59 +1,13 @@
 //! Drops, merges and spawns anchors.
-use super::{CpuDispatch, load_f32, load_u32, shared::Ray, store_f32, store_u32};
+pub use mte_slam_shaders::kernels::maintain_anchors::MaintainAnchorsParams;
+
+use crate::kernel::{CpuDispatch, load_f32, load_u32, store_f32, store_u32};
 use crate::layout::{
     ANCHOR_FLOATS, FEATURE, NO_DISTANCE, RAY_STATE_FLOATS, STATE_ANCHOR, STATE_FEATURE,
 };
 use core::sync::atomic::AtomicU32;
 
-params! {
-    /// Parameters of [`MAINTAIN_ANCHORS`].
-    pub struct MaintainAnchorsParams {
-        /// Rays of the batch.
-        rays: u32,
-        /// Slots of anchors, at most 256.
-        anchors: u32,
-        /// Classes, at most 255.
-        classes: u32,
-        /// Anchors spawned at most.
-        spawns: u32,
-        /// A feature this far from every anchor of its class (squared) may spawn one.
-        spawn_distance: f32,
-        /// Anchors of a class closer than this (squared) are duplicates; nor does anything spawn
-        /// this close to an anchor.
-        merge_distance: f32,
-        /// Duplicates merge once both move less than this an update.
-        stable: f32,
-        /// Less important anchors are dropped.
-        min_importance: f32,
-        /// Updates before an anchor may be dropped or merged.
-        min_age: f32,
-        /// 1: only classes that labels bear out (`class_support`) get anchors.
-        supported: u32,
-        /// Unused.
-        spare0: u32,
-        /// Unused.
-        spare1: u32,
-    }
-}
-
-kernel! {
-    /// Drops unimportant anchors, merges stable duplicates, spawns anchors for features far from
-    /// their class's; where all slots are taken, a class without any takes the place of the least
-    /// important one that is not its class's last. Counts what it did (alive, spawned, dropped, merged).
-    pub static MAINTAIN_ANCHORS = "maintain_anchors" {
-        workgroup_size: 256,
-        params: MaintainAnchorsParams,
-        twin: twin,
-        bindings: [
-            rays: Read,
-            ray_state: ReadWrite,
-            anchors: ReadWrite,
-            votes: ReadWrite,
-            anchor_counts: ReadWrite,
-            class_support: Read,
-        ],
-    }
-}
+kernel! { pub static MAINTAIN_ANCHORS = mte_slam_shaders::kernels::maintain_anchors, twin }
 
 const FREE: u32 = 255;
 
@@ -87,15 +41,12 @@ impl Set<'_> {
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: MaintainAnchorsParams = dispatch.params();
-    let ray_words = dispatch.read_f32(0);
-    let state = dispatch.write(1);
-    let set =
-        Set { anchors: dispatch.write(2), votes: dispatch.write(3), classes: p.classes as usize };
-    let counts = dispatch.write(4);
-    let support = dispatch.read_f32(5);
+    let Views { rays, ray_state: state, anchors, votes, anchor_counts: counts, class_support } =
+        dispatch.views();
+    let set = Set { anchors, votes, classes: p.classes as usize };
     // More labels than not agree, and not by a single one.
     let borne_out = |class: u32| {
-        let [agree, disagree] = [0, 1].map(|k| support[2 * class as usize + k].to_bits());
+        let [agree, disagree] = [0, 1].map(|k| class_support[2 * class as usize + k]);
         p.supported == 0 || agree > disagree + 1
     };
     let n = p.anchors as usize;
@@ -153,7 +104,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
     for _ in 0..p.spawns {
         let (mut furthest, mut chosen) = (p.spawn_distance, None);
         for ray in 0..p.rays as usize {
-            let r = Ray::load(ray_words, ray);
+            let r = rays[ray];
             if r.masked() || r.class() >= p.classes || !borne_out(r.class()) {
                 continue;
             }
@@ -167,7 +118,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             }
         }
         let Some(ray) = chosen else { break };
-        let class = Ray::load(ray_words, ray).class();
+        let class = rays[ray].class();
         let mut slot = (0..n).find(|i| set.class(*i) == FREE);
         if slot.is_none() && of_class[class as usize] == 0 {
             // Full: the least important anchor that is not its class's last makes room.
@@ -201,7 +152,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             let d = set.distance(free, |k| feature(other, k));
             let at = other * RAY_STATE_FLOATS + STATE_ANCHOR as usize * 4;
             store_f32(&state[at + 1], load_f32(&state[at + 1]).min(d));
-            if Ray::load(ray_words, other).class() == class {
+            if rays[other].class() == class {
                 store_f32(&state[at + 2], load_f32(&state[at + 2]).min(d));
             }
         }

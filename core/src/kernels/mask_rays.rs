@@ -1,20 +1,12 @@
 //! Takes outliers out of the tracking losses.
-use super::{CpuDispatch, load_f32, store_f32};
+use crate::kernel::{CpuDispatch, load_f32, store_f32};
 use crate::layout::{FieldParams, RAY_OUT_FLOATS};
 
-kernel! {
-    /// Masks rays without depth and those whose depth error exceeds ten times the median.
-    pub static MASK_RAYS = "mask_rays" {
-        workgroup_size: 64,
-        params: FieldParams,
-        twin: twin,
-        bindings: [ray_out: ReadWrite],
-    }
-}
+kernel! { pub static MASK_RAYS = mte_slam_shaders::kernels::mask_rays, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let ray_out = dispatch.write(0);
+    let Views { ray_out } = dispatch.views();
     let error = |ray: usize| load_f32(&ray_out[ray * RAY_OUT_FLOATS + 10]);
     let mut bins = [0_u32; 512];
     for ray in 0..p.rays as usize {

@@ -1,106 +1,19 @@
-//! The registry of kernels: each exists as `shaders/NAME.wgsl` and as a Rust twin in
-//! `kernels/NAME.rs`, registered together with its bindings by [`kernel!`](crate::kernel).
+//! The kernels' Rust twins and the registry: kernel NAME is `NAME.wgsl` and
+//! `src/kernels/NAME.rs` (its declaration) in `mte-slam-shaders`, and its twin `kernels/NAME.rs` here,
+//! joined by [`kernel!`](crate::kernel!).
 //!
-//! To add one: write both files and add a line to `registry!` below. In the shader, binding 0 is
-//! `var<uniform> params: Params`, the bindings of the list follow from 1 on, the entry point is
-//! `main` with `@workgroup_size(WORKGROUP_SIZE)`.
-mod dispatch;
-#[macro_use]
-mod params;
+//! To add one: write the three files and add a line to `registry!` in both crates. In the twin, the
+//! declaration's bindings are fields of `Views`; a call names them as fields of `Buffers`.
 pub mod shared;
 pub mod tokens;
 
-pub use dispatch::{
-    CpuBinding, CpuDispatch, add_i32, load_f32, load_i32, load_u32, or_u32, store_f32, store_i32,
-    store_u32,
-};
-pub use params::{FieldKind, ParamsField, ParamsFieldType, ParamsLayout};
-
-/// How a kernel uses a storage buffer.
-#[derive(Copy, Clone, PartialEq, Eq, Debug)]
-pub enum Access {
-    /// `var<storage, read>`.
-    Read,
-    /// `var<storage, read_write>`.
-    ReadWrite,
-}
-
-/// One storage buffer of a kernel.
-#[derive(Copy, Clone, PartialEq, Eq, Debug)]
-pub struct Binding {
-    /// Name of the variable in the shader.
-    pub name: &'static str,
-    /// Read only, or read and written.
-    pub access: Access,
-}
-
-/// A kernel: shader, twin, and what both agree on.
-pub struct Kernel {
-    /// Name of the shader file without extension.
-    pub name: &'static str,
-    /// Source before the preprocessor ([`crate::shader::compose`]).
-    pub wgsl: &'static str,
-    /// Invocations a workgroup (along x).
-    pub workgroup_size: u32,
-    /// Storage buffers at binding 1, 2, ... of group 0.
-    pub bindings: &'static [Binding],
-    /// Layout of the uniform struct at binding 0.
-    pub params: &'static ParamsLayout,
-    /// The same computation in Rust.
-    pub twin: fn(&CpuDispatch<'_>),
-}
-
-impl core::fmt::Debug for Kernel {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("Kernel").field("name", &self.name).finish_non_exhaustive()
-    }
-}
-
-/// Registers a kernel with its twin and binding list:
-/// ```text
-/// kernel! {
-///     /// What it computes.
-///     pub static ADAM = "adam" {
-///         workgroup_size: 256,
-///         params: AdamParams,
-///         twin: twin,
-///         bindings: [parameters: ReadWrite, gradient: Read],
-///     }
-/// }
-/// ```
-#[macro_export]
-macro_rules! kernel {
-    (
-        $(#[$doc:meta])*
-        pub static $id:ident = $name:literal {
-            workgroup_size: $size:expr,
-            params: $params:ty,
-            twin: $twin:path,
-            bindings: [$($binding:ident: $access:ident),* $(,)?] $(,)?
-        }
-    ) => {
-        $(#[$doc])*
-        pub static $id: $crate::kernels::Kernel = $crate::kernels::Kernel {
-            name: $name,
-            wgsl: $crate::embedded_shader!(concat!(
-                env!("CARGO_MANIFEST_DIR"), "/../shaders/", $name, ".wgsl"
-            )),
-            workgroup_size: $size,
-            bindings: &[$($crate::kernels::Binding {
-                name: stringify!($binding),
-                access: $crate::kernels::Access::$access,
-            }),*],
-            params: &<$params>::LAYOUT,
-            twin: $twin,
-        };
-    };
-}
+use crate::kernel::Kernel;
 
 /// Declares the kernel modules and lists their kernels.
 macro_rules! registry {
-    ($($(#[$doc:meta])* $module:ident: $id:ident),* $(,)?) => {
-        $($(#[$doc])* pub mod $module;)*
-        static ALL: &[&Kernel] = &[$(&$module::$id),*];
+    ($($(#[doc = $doc:literal])* $(#[cfg($cfg:meta)])? $module:ident: $id:ident),* $(,)?) => {
+        $($(#[doc = $doc])* $(#[cfg($cfg)])? pub mod $module;)*
+        static ALL: &[&Kernel] = &[$($(#[cfg($cfg)])? &$module::$id),*];
     };
 }
 
@@ -119,7 +32,7 @@ registry! {
     composite: COMPOSITE,
     /// Gradients at the signed distances.
     composite_backward: COMPOSITE_BACKWARD,
-    /// Colour, classes and losses.
+    /// Color, classes and losses.
     decode_rays: DECODE_RAYS,
     /// Raw features of image patches.
     extract_tokens: EXTRACT_TOKENS,
@@ -140,6 +53,7 @@ registry! {
     /// Nearest anchors of a ray's class and of another.
     match_rivals: MATCH_RIVALS,
     /// Layers on samples.
+    #[cfg(feature = "sample-head")]
     matrix_product: MATRIX_PRODUCT,
     /// Rays' pose gradients.
     pose_gradient: POSE_GRADIENT,
@@ -154,8 +68,10 @@ registry! {
     /// Sample placement.
     sample_depths: SAMPLE_DEPTHS,
     /// Semantic features of samples.
+    #[cfg(feature = "sample-head")]
     sample_features: SAMPLE_FEATURES,
     /// Classes from samples.
+    #[cfg(feature = "sample-head")]
     sample_logits: SAMPLE_LOGITS,
     /// Pixels and rays.
     sample_rays: SAMPLE_RAYS,

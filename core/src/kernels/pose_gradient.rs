@@ -1,23 +1,13 @@
 //! Sums the gradients at a ray's sample positions into its pose gradient.
-use super::shared::{Ray, cross};
-use super::{CpuDispatch, load_f32, store_f32};
+use super::shared::cross;
+use crate::kernel::{CpuDispatch, load_f32, store_f32};
 use crate::layout::{FieldParams, RAY_STATE_FLOATS, STATE_POSE};
 
-kernel! {
-    /// Pose gradient of each ray: translation, and rotation about the camera's centre.
-    pub static POSE_GRADIENT = "pose_gradient" {
-        workgroup_size: 64,
-        params: FieldParams,
-        twin: twin,
-        bindings: [rays: Read, depths: Read, position_gradient: Read, ray_state: ReadWrite],
-    }
-}
+kernel! { pub static POSE_GRADIENT = mte_slam_shaders::kernels::pose_gradient, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let (rays, depths, positions) =
-        (dispatch.read_f32(0), dispatch.read_f32(1), dispatch.read_f32(2));
-    let ray_state = dispatch.write(3);
+    let Views { rays, depths, position_gradient: positions, ray_state } = dispatch.views();
     let n = p.samples as usize;
     dispatch.for_each_invocation(|id| {
         if id >= p.rays as usize {
@@ -34,7 +24,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                 moment[k] += depths[sample] * dp;
             }
         }
-        let dw = cross(Ray::load(rays, id).direction, moment);
+        let dw = cross(rays[id].direction, moment);
         for k in 0..3 {
             store_f32(&pose[k], v[k]);
             store_f32(&pose[4 + k], w[k] + dw[k]);

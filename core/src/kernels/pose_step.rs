@@ -1,6 +1,8 @@
 //! One Adam step on the pose of each window frame.
+pub use mte_slam_shaders::kernels::pose_step::PoseStepParams;
+
 use super::shared::{cross, sin_cos};
-use super::{CpuDispatch, load_f32, store_f32};
+use crate::kernel::{CpuDispatch, load_f32, store_f32};
 use crate::layout::{RAY_OUT_FLOATS, RAY_STATE_FLOATS, STATE_POSE};
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
@@ -11,45 +13,11 @@ pub const POSE_STATE_FLOATS: usize = 36;
 /// Index of the best loss in a frame's state.
 pub const POSE_BEST_LOSS: usize = 12;
 
-params! {
-    /// Parameters of [`POSE_STEP`].
-    pub struct PoseStepParams {
-        /// Rays of each frame.
-        rays_per_frame: u32,
-        /// 1: forget moments and best pose first.
-        restart: u32,
-        /// Step size \[m\].
-        learning_rate_translation: f32,
-        /// Step size \[rad\].
-        learning_rate_rotation: f32,
-        /// Weight of the colour loss.
-        weight_color: f32,
-        /// Weight of the depth loss.
-        weight_depth: f32,
-    }
-}
-
-kernel! {
-    /// Sums the rays' pose gradients, one Adam step, left retraction; keeps the best pose.
-    pub static POSE_STEP = "pose_step" {
-        workgroup_size: 64,
-        params: PoseStepParams,
-        twin: twin,
-        bindings: [
-            ray_state: Read,
-            ray_out: Read,
-            window: Read,
-            poses: ReadWrite,
-            pose_state: ReadWrite,
-        ],
-    }
-}
+kernel! { pub static POSE_STEP = mte_slam_shaders::kernels::pose_step, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: PoseStepParams = dispatch.params();
-    let (ray_state, ray_out) = (dispatch.read_f32(0), dispatch.read_f32(1));
-    let window = dispatch.read_u32(2);
-    let (poses, pose_state) = (dispatch.write(3), dispatch.write(4));
+    let Views { ray_state, ray_out, window, poses, pose_state } = dispatch.views();
     dispatch.for_each_workgroup(|frame| {
         let mut step = [0.0_f32; 6];
         let mut loss = 0.0;

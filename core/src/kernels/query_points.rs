@@ -4,35 +4,22 @@ use super::shared::{
     FLAG_ANCHORS, FLAG_MAP, Grid, color_hidden, color_output, geometry_decoder, likeliest_class,
     semantic_hidden, semantic_output, surface_weights,
 };
-use super::{CpuDispatch, store_f32, store_u32};
+use crate::kernel::{CpuDispatch, store_f32, store_u32};
 use crate::layout::{FieldParams, NO_ANCHOR};
 
-kernel! {
-    /// Signed distance \[truncations\] at points; with `FLAG_MAP` colour and class too, with
-    /// `FLAG_ANCHORS` the class of the nearest anchor.
-    pub static QUERY_POINTS = "query_points" {
-        workgroup_size: 64,
-        params: FieldParams,
-        twin: twin,
-        bindings: [
-            points: Read,
-            planes_geometry: Read,
-            planes_appearance: Read,
-            planes_semantic: Read,
-            decoders: Read,
-            anchors: Read,
-            values: ReadWrite,
-        ],
-    }
-}
+kernel! { pub static QUERY_POINTS = mte_slam_shaders::kernels::query_points, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let points = dispatch.read_f32(0);
-    let (geometry, appearance, semantic) =
-        (dispatch.read_f32(1), dispatch.read_f32(2), dispatch.read_f32(3));
-    let decoders = dispatch.read_f32(4);
-    let (anchors, values) = (dispatch.read_f32(5), dispatch.write(6));
+    let Views {
+        points,
+        planes_geometry: geometry,
+        planes_appearance: appearance,
+        planes_semantic: semantic,
+        decoders,
+        anchors,
+        values,
+    } = dispatch.views();
     let (grid, surface_grid) = (Grid::geometry(&p), Grid::surface(&p));
     let surface = surface_weights(decoders);
     dispatch.for_each_invocation(|i| {

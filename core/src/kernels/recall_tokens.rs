@@ -1,26 +1,16 @@
 //! What the map already holds at the tokens' points.
 use super::{
-    CpuDispatch, load_f32,
     shared::{Grid, semantic_hidden, semantic_output, surface_weights},
-    store_f32,
     tokens::{RAW_MEMORY, RAW_POINT},
 };
+use crate::kernel::{CpuDispatch, load_f32, store_f32};
 use crate::layout::FieldParams;
 
-kernel! {
-    /// The map's semantic feature at each token's point, as an input of the fusion.
-    pub static RECALL_TOKENS = "recall_tokens" {
-        workgroup_size: 64,
-        params: FieldParams,
-        twin: twin,
-        bindings: [planes_semantic: Read, decoders: Read, raw: ReadWrite],
-    }
-}
+kernel! { pub static RECALL_TOKENS = mte_slam_shaders::kernels::recall_tokens, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let (planes, decoders) = (dispatch.read_f32(0), dispatch.read_f32(1));
-    let raw = dispatch.write(2);
+    let Views { planes_semantic: planes, decoders, raw } = dispatch.views();
     let (grid, surface) = (Grid::surface(&p), surface_weights(decoders));
     dispatch.for_each_invocation(|token| {
         if token >= (p.token_columns * p.token_rows) as usize {

@@ -2,18 +2,11 @@
 use super::shared::{
     FLAG_DENSE, FLAG_GUIDED, Grid, Ray, geometry_decoder, interval_alpha, phi, random_f32,
 };
-use super::{CpuDispatch, store_f32};
+use crate::kernel::{CpuDispatch, store_f32};
 use crate::layout::{FieldParams, MAX_STRATIFIED};
+use mte_slam_shaders::random::salt;
 
-kernel! {
-    /// Places the samples of each ray, sorted.
-    pub static SAMPLE_DEPTHS = "sample_depths" {
-        workgroup_size: 64,
-        params: FieldParams,
-        twin: twin,
-        bindings: [rays: Read, planes_geometry: Read, decoders: Read, depths: ReadWrite],
-    }
-}
+kernel! { pub static SAMPLE_DEPTHS = mte_slam_shaders::kernels::sample_depths, twin }
 
 /// Depth at which a ray leaves the box.
 fn exit_depth(p: &FieldParams, ray: &Ray) -> f32 {
@@ -33,20 +26,18 @@ fn mix(a: f32, b: f32, t: f32) -> f32 {
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let (rays, planes, decoders) =
-        (dispatch.read_f32(0), dispatch.read_f32(1), dispatch.read_f32(2));
-    let depths = dispatch.write(3);
+    let Views { rays, planes_geometry: planes, decoders, depths } = dispatch.views();
     let grid = Grid::geometry(&p);
     dispatch.for_each_invocation(|id| {
         if id >= p.rays as usize {
             return;
         }
-        let ray = Ray::load(rays, id);
+        let ray = rays[id];
         let jitter = |k: usize| {
             if p.flags & FLAG_DENSE != 0 {
                 0.5
             } else {
-                random_f32(p.seed, p.iteration, id as u32 * 256 + k as u32, 2)
+                random_f32(p.seed, p.iteration, id as u32 * 256 + k as u32, salt::JITTER)
             }
         };
         let (n, m) = ((p.stratified.min(MAX_STRATIFIED)) as usize, p.surface_samples as usize);

@@ -1,33 +1,21 @@
 //! Semantic plane features of a ray's samples.
-use super::shared::{Grid, Ray};
-use super::{CpuDispatch, store_f32};
+use super::shared::Grid;
+use crate::kernel::{CpuDispatch, store_f32};
 use crate::layout::FieldParams;
 
-kernel! {
-    /// Features, depth and weight of every slot of a ray: all intervals, or in views the first ones
-    /// that carry weight.
-    pub static SAMPLE_FEATURES = "sample_features" {
-        workgroup_size: 64,
-        params: FieldParams,
-        twin: twin,
-        bindings: [
-            rays: Read,
-            depths: Read,
-            weights: Read,
-            planes_semantic: Read,
-            features: ReadWrite,
-            slot_depths: ReadWrite,
-            slot_weights: ReadWrite,
-        ],
-    }
-}
+kernel! { pub static SAMPLE_FEATURES = mte_slam_shaders::kernels::sample_features, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let (rays, depths) = (dispatch.read_f32(0), dispatch.read_f32(1));
-    let (weights, planes) = (dispatch.read_f32(2), dispatch.read_f32(3));
-    let (features, slot_depths) = (dispatch.write(4), dispatch.write(5));
-    let slot_weights = dispatch.write(6);
+    let Views {
+        rays,
+        depths,
+        weights,
+        planes_semantic: planes,
+        features,
+        slot_depths,
+        slot_weights,
+    } = dispatch.views();
     let grid = Grid::surface(&p);
     let (n, slots) = (p.samples as usize, p.slots as usize);
     dispatch.for_each_invocation(|job| {
@@ -45,7 +33,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         if let Some(i) = i {
             weight = weights[i];
             z = 0.5 * (depths[id * n + i] + depths[id * n + (i + 1).min(n - 1)]);
-            f = grid.lookup(planes, Ray::load(rays, id).at(z));
+            f = grid.lookup(planes, rays[id].at(z));
         }
         store_f32(&slot_depths[job], z);
         store_f32(&slot_weights[job], weight);

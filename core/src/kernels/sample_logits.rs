@@ -1,53 +1,17 @@
 //! Class logits of a ray's samples: composited, their loss, its gradients.
-use super::shared::Ray;
-use super::{CpuDispatch, load_f32, store_f32, store_u32};
+pub use mte_slam_shaders::kernels::sample_logits::SampleLogitsParams;
+
+use crate::kernel::{CpuDispatch, load_f32, store_f32, store_u32};
 use crate::layout::RAY_OUT_FLOATS;
 use alloc::vec;
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
-params! {
-    /// Parameters of [`SAMPLE_LOGITS`].
-    pub struct SampleLogitsParams {
-        /// Rays of this part of the batch.
-        rays: u32,
-        /// The first of them.
-        first_ray: u32,
-        /// Rays of the whole batch.
-        batch_rays: u32,
-        /// Slots of samples a ray.
-        slots: u32,
-        /// Classes.
-        classes: u32,
-        /// 1: write the gradients.
-        train: u32,
-        /// Weight of the cross-entropy.
-        weight_semantic: f32,
-    }
-}
-
-kernel! {
-    /// Composites logits (the weights are constants), scores them, and puts their gradients in
-    /// their place.
-    pub static SAMPLE_LOGITS = "sample_logits" {
-        workgroup_size: 64,
-        params: SampleLogitsParams,
-        twin: twin,
-        bindings: [
-            rays: Read,
-            slot_weights: Read,
-            class_weights: Read,
-            logits: ReadWrite,
-            ray_out: ReadWrite,
-        ],
-    }
-}
+kernel! { pub static SAMPLE_LOGITS = mte_slam_shaders::kernels::sample_logits, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: SampleLogitsParams = dispatch.params();
-    let (rays, weights) = (dispatch.read_f32(0), dispatch.read_f32(1));
-    let class_weights = dispatch.read_f32(2);
-    let (logits, ray_out) = (dispatch.write(3), dispatch.write(4));
+    let Views { rays, slot_weights: weights, class_weights, logits, ray_out } = dispatch.views();
     let (slots, classes) = (p.slots as usize, p.classes as usize);
     dispatch.for_each_workgroup(|group| {
         if group >= p.rays {
@@ -77,7 +41,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
                 sum += (*v - best).exp();
             }
         }
-        let ray = Ray::load(rays, id);
+        let ray = rays[id];
         let label = ray.class() as usize;
         let (mut loss, mut scale) = (0.0, 0.0);
         if label < classes && !ray.masked() {

@@ -1,31 +1,15 @@
 //! Pixel and ray sampling.
-use super::CpuDispatch;
 use super::shared::{FLAG_DENSE, FLAG_GUIDED, RAY_MASKED, RAY_WORDS, Ray, random_f32, random_u32};
-use crate::{kernels::store_u32, layout::FieldParams};
+use crate::kernel::{CpuDispatch, store_u32};
+use crate::layout::FieldParams;
+use mte_slam_shaders::random::salt;
 
-kernel! {
-    /// Draws the pixels of a batch and makes their world rays.
-    pub static SAMPLE_RAYS = "sample_rays" {
-        workgroup_size: 64,
-        params: FieldParams,
-        twin: twin,
-        bindings: [
-            poses: Read,
-            window: Read,
-            color_images: Read,
-            depth_images: Read,
-            class_rarity: Read,
-            rays: ReadWrite,
-        ],
-    }
-}
+kernel! { pub static SAMPLE_RAYS = mte_slam_shaders::kernels::sample_rays, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let (poses, window) = (dispatch.read_f32(0), dispatch.read_u32(1));
-    let (color_images, depth_images) = (dispatch.read_u32(2), dispatch.read_u32(3));
-    let class_rarity = dispatch.read_f32(4);
-    let out = dispatch.write(5);
+    let Views { poses, window, color_images, depth_images, class_rarity, rays: out } =
+        dispatch.views();
     let pixels = p.width * p.height;
     let depth_stride = pixels.div_ceil(2);
     let raw_depth = |slot: u32, pixel: u32| {
@@ -49,17 +33,18 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         let mut pixel = (p.first.wrapping_add(index)) % pixels;
         let mut raw = 0;
         if p.flags & FLAG_DENSE == 0 {
-            pixel = random_u32(p.seed, p.iteration, index, 0) % pixels;
+            pixel = random_u32(p.seed, p.iteration, index, salt::PIXEL) % pixels;
             raw = raw_depth(slot, pixel);
             if raw == 0 {
-                pixel = random_u32(p.seed, p.iteration, index, 1) % pixels;
+                pixel = random_u32(p.seed, p.iteration, index, salt::PIXEL_AGAIN) % pixels;
                 raw = raw_depth(slot, pixel);
             }
-            if p.classes > 0 && random_f32(p.seed, p.iteration, index, 3) < p.rare_share {
+            if p.classes > 0 && random_f32(p.seed, p.iteration, index, salt::RARE) < p.rare_share {
                 let mut best = rarity(slot, pixel);
                 for k in 1..p.rare_draws {
                     let at = index.wrapping_mul(256).wrapping_add(k);
-                    let candidate = random_u32(p.seed, p.iteration, at, 4) % pixels;
+                    let candidate =
+                        random_u32(p.seed, p.iteration, at, salt::RARE_CANDIDATE) % pixels;
                     let rare = rarity(slot, candidate);
                     if rare > best {
                         (best, pixel) = (rare, candidate);

@@ -1,26 +1,11 @@
 //! Adds feature gradients into the geometry planes, fixed point.
 use super::adam::STATUS_SATURATED;
-use super::shared::{Grid, Ray, plane_corners};
-use super::{CpuDispatch, add_i32, or_u32};
+use super::shared::{Grid, plane_corners};
+use crate::kernel::{CpuDispatch, add_i32, or_u32};
 use crate::layout::FieldParams;
 use core::sync::atomic::AtomicU32;
 
-kernel! {
-    /// Scatter of the geometry features' gradients; samples of a ray in one cell are summed first.
-    pub static SCATTER_GEOMETRY = "scatter_geometry" {
-        workgroup_size: 64,
-        params: FieldParams,
-        twin: twin,
-        bindings: [
-            rays: Read,
-            depths: Read,
-            distance_gradient: Read,
-            features: Read,
-            gradient: ReadWrite,
-            status: ReadWrite,
-        ],
-    }
-}
+kernel! { pub static SCATTER_GEOMETRY = mte_slam_shaders::kernels::scatter_geometry, twin }
 
 /// Adds `values * scale` as quanta, clamped to `limit` (and reported) each.
 pub(super) fn add_quanta(
@@ -48,9 +33,8 @@ pub(super) fn add_quanta(
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let (ray_words, depths) = (dispatch.read_f32(0), dispatch.read_f32(1));
-    let (ds, features) = (dispatch.read_f32(2), dispatch.read_f32(3));
-    let (gradient, status) = (dispatch.write(4), dispatch.write(5));
+    let Views { rays: ray_words, depths, distance_gradient: ds, features, gradient, status } =
+        dispatch.views();
     let grid = Grid::geometry(&p);
     let n = p.samples as usize;
     dispatch.for_each_invocation(|job| {
@@ -60,7 +44,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         let rays = p.rays as usize;
         let (quad, id, part) = (job % 4, (job / 4) % rays, job / (4 * rays));
         let (plane, level) = (part % 3, part / 3);
-        let ray = Ray::load(ray_words, id);
+        let ray = ray_words[id];
         let mut held = [usize::MAX; 4];
         let mut sums = [[0.0_f32; 4]; 4];
         let flush = |held: [usize; 4], sums: &[[f32; 4]; 4]| {

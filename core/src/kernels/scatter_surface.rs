@@ -1,35 +1,25 @@
 //! Adds feature gradients into the appearance and semantic planes, fixed point.
-use super::CpuDispatch;
 use super::scatter_geometry::add_quanta;
-use super::shared::{Grid, Ray, plane_corners};
+use super::shared::{Grid, plane_corners};
+use crate::kernel::CpuDispatch;
 use crate::layout::{
     FieldParams, RAY_STATE_FLOATS, STATE_APPEARANCE_GRADIENT, STATE_DEPTH, STATE_SEMANTIC_GRADIENT,
 };
 
-kernel! {
-    /// Scatter of the composited features' gradients, weighted by the intervals.
-    pub static SCATTER_SURFACE = "scatter_surface" {
-        workgroup_size: 64,
-        params: FieldParams,
-        twin: twin,
-        bindings: [
-            rays: Read,
-            depths: Read,
-            weights: Read,
-            ray_state: Read,
-            gradient_appearance: ReadWrite,
-            gradient_semantic: ReadWrite,
-            status: ReadWrite,
-        ],
-    }
-}
+kernel! { pub static SCATTER_SURFACE = mte_slam_shaders::kernels::scatter_surface, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: FieldParams = dispatch.params();
-    let (ray_words, depths) = (dispatch.read_f32(0), dispatch.read_f32(1));
-    let (weights, ray_state) = (dispatch.read_f32(2), dispatch.read_f32(3));
-    let targets = [dispatch.write(4), dispatch.write(5)];
-    let status = dispatch.write(6);
+    let Views {
+        rays: all_rays,
+        depths,
+        weights,
+        ray_state,
+        gradient_appearance,
+        gradient_semantic,
+        status,
+    } = dispatch.views();
+    let targets = [gradient_appearance, gradient_semantic];
     let grid = Grid::surface(&p);
     let n = p.samples as usize;
     dispatch.for_each_invocation(|job| {
@@ -39,11 +29,11 @@ fn twin(dispatch: &CpuDispatch<'_>) {
         let rays = p.rays as usize;
         let (quad, id, part) = (job % 4, (job / 4) % rays, job / (4 * rays));
         let (plane, level, modality) = (part % 3, (part / 3) % 2, part / 6);
-        let ray = Ray::load(ray_words, id);
+        let ray = all_rays[id];
         let unlabelled =
             ray.class() >= p.classes && p.weight_compression == 0.0 && p.weight_feature == 0.0;
-        let colourless = modality == 0 && p.weight_color == 0.0;
-        if ray.masked() || colourless || (modality == 1 && unlabelled) {
+        let colorless = modality == 0 && p.weight_color == 0.0;
+        if ray.masked() || colorless || (modality == 1 && unlabelled) {
             return;
         }
         let (scale, state) = if modality == 1 {

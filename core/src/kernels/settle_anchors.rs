@@ -1,53 +1,17 @@
-//! Anchors settle where the nearest one tells the head's class.
-use super::{
-    CpuDispatch, load_f32, load_u32,
-    shared::{Ray, likeliest_class},
-    store_f32, store_u32,
-};
+//! Anchors settle where the nearest one gives the head's class.
+pub use mte_slam_shaders::kernels::settle_anchors::SettleAnchorsParams;
+
+use super::shared::likeliest_class;
+use crate::kernel::{CpuDispatch, load_f32, load_u32, store_f32, store_u32};
 use crate::layout::{
     ANCHOR_FLOATS, FEATURE, NO_ANCHOR, RAY_STATE_FLOATS, STATE_ANCHOR, STATE_FEATURE,
 };
 
-params! {
-    /// Parameters of [`SETTLE_ANCHORS`].
-    pub struct SettleAnchorsParams {
-        /// Rays of the batch; 0: the anchors stay where they are and take the head's classes.
-        rays: u32,
-        /// Slots of anchors.
-        anchors: u32,
-        /// Classes.
-        classes: u32,
-        /// Share of the way to the weighted mean of what pulls and pushes, 0..1.
-        rate: f32,
-        /// How sharply rays count that are mistaken, or nearly so.
-        slope: f32,
-        /// Unused.
-        spare0: u32,
-        /// Unused.
-        spare1: u32,
-        /// Unused.
-        spare2: u32,
-    }
-}
-
-kernel! {
-    /// A step of generalised learning vector quantisation (Sato and Yamada, 1996) with the head as
-    /// the teacher: with d the squared distance of a ray's feature to the nearest anchor of its class
-    /// and e to the nearest of another (`match_rivals`), the former comes closer by s e / (d + e), the
-    /// latter goes by s d / (d + e), where s is the logistic function of slope (d - e) / (d + e).
-    /// After that an anchor's class is the head's.
-    pub static SETTLE_ANCHORS = "settle_anchors" {
-        workgroup_size: 64,
-        params: SettleAnchorsParams,
-        twin: twin,
-        bindings: [rays: Read, ray_state: Read, decoders: Read, anchors: ReadWrite],
-    }
-}
+kernel! { pub static SETTLE_ANCHORS = mte_slam_shaders::kernels::settle_anchors, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: SettleAnchorsParams = dispatch.params();
-    let (ray_words, ray_state) = (dispatch.read_f32(0), dispatch.read_f32(1));
-    let (decoders, anchors) = (dispatch.read_f32(2), dispatch.write(3));
+    let Views { rays: ray_words, ray_state, decoders, anchors } = dispatch.views();
     dispatch.for_each_workgroup(|index| {
         let anchor = &anchors[index as usize * ANCHOR_FLOATS..(index as usize + 1) * ANCHOR_FLOATS];
         if load_u32(&anchor[16]) == 255 {
@@ -63,7 +27,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             if !concerned || own == NO_ANCHOR || rival == NO_ANCHOR {
                 continue;
             }
-            if Ray::load(ray_words, ray).masked() {
+            if ray_words[ray].masked() {
                 continue;
             }
             let (d, e) = (at[2], at[3]);

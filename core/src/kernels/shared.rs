@@ -1,110 +1,17 @@
 //! Twins of the imported shader parts (`shaders/shared/*.wgsl`): rays, random numbers, planes,
 //! decoders, interval weights. Same formulas in the same order; summation order may differ.
-use crate::layout::{FieldParams, GEOMETRY_FLOATS, HEAD_FLOATS, SURFACE_FLOATS};
+pub use mte_slam_shaders::rays::{
+    FLAG_ANCHORS, FLAG_DENSE, FLAG_GUIDED, FLAG_MAP, FLAG_MASK, FLAG_POSE, RAY_MASKED, RAY_WORDS,
+    Ray,
+};
 
-/// Pixels are taken in order, not drawn.
-pub const FLAG_DENSE: u32 = 1;
-/// Depth images guide the samples of rays that have a depth.
-pub const FLAG_GUIDED: u32 = 2;
-/// Write gradients with respect to sample positions.
-pub const FLAG_POSE: u32 = 4;
-/// Write gradients with respect to plane features.
-pub const FLAG_MAP: u32 = 8;
-/// Mask rays whose depth error passes the outlier threshold.
-pub const FLAG_MASK: u32 = 16;
-/// Class of a ray: that of its nearest anchor, not the head's.
-pub const FLAG_ANCHORS: u32 = 32;
-/// Bit of `Ray::frame` that takes a ray out of every loss.
-pub const RAY_MASKED: u32 = 0x8000_0000;
+use crate::layout::{FieldParams, GEOMETRY_FLOATS, HEAD_FLOATS, SURFACE_FLOATS};
+use mte_slam_shaders::decoders::{COLOR, GEOMETRY, Layer, SEMANTIC};
 
 /// Three floats.
 pub type Vec3 = [f32; 3];
 /// Features of one modality at a point: 16 coarse, 16 fine channels.
 pub type Features = [f32; 32];
-
-/// Floats a ray takes in its buffer.
-pub const RAY_WORDS: usize = 12;
-
-/// A ray: position at depth z is origin + z * direction.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Ray {
-    /// World position of the camera \[m\].
-    pub origin: Vec3,
-    /// Sensor depth \[m\], 0 where there is none.
-    pub depth: f32,
-    /// World direction, 1 along the camera's axis.
-    pub direction: Vec3,
-    /// Index in the window (8 bits), slot (23 bits), [`RAY_MASKED`].
-    pub frame: u32,
-    /// sRGB colour in 0..1.
-    pub color: Vec3,
-    /// Compact class (8 bits), pixel (24 bits).
-    pub label: u32,
-}
-
-impl Ray {
-    /// Ray `index` of a ray buffer.
-    pub fn load(rays: &[f32], index: usize) -> Ray {
-        let r = &rays[index * RAY_WORDS..(index + 1) * RAY_WORDS];
-        Ray {
-            origin: [r[0], r[1], r[2]],
-            depth: r[3],
-            direction: [r[4], r[5], r[6]],
-            frame: r[7].to_bits(),
-            color: [r[8], r[9], r[10]],
-            label: r[11].to_bits(),
-        }
-    }
-
-    /// The ray's words.
-    pub fn words(&self) -> [u32; RAY_WORDS] {
-        let f = f32::to_bits;
-        let (o, d, c) = (self.origin, self.direction, self.color);
-        [
-            f(o[0]),
-            f(o[1]),
-            f(o[2]),
-            f(self.depth),
-            f(d[0]),
-            f(d[1]),
-            f(d[2]),
-            self.frame,
-            f(c[0]),
-            f(c[1]),
-            f(c[2]),
-            self.label,
-        ]
-    }
-
-    /// Point at depth z.
-    pub fn at(&self, z: f32) -> Vec3 {
-        [
-            self.origin[0] + z * self.direction[0],
-            self.origin[1] + z * self.direction[1],
-            self.origin[2] + z * self.direction[2],
-        ]
-    }
-
-    /// Compact class, 255 where unlabelled.
-    pub fn class(&self) -> u32 {
-        self.label & 255
-    }
-
-    /// Pixel, counted row by row.
-    pub fn pixel(&self) -> u32 {
-        self.label >> 8
-    }
-
-    /// Storage slot of the frame.
-    pub fn slot(&self) -> u32 {
-        (self.frame & !RAY_MASKED) >> 8
-    }
-
-    /// Whether no loss may use the ray.
-    pub fn masked(&self) -> bool {
-        self.frame & RAY_MASKED != 0
-    }
-}
 
 /// Sine and cosine of an angle \[rad\] of up to some hundreds, to 1e-6 of 1, by the polynomials of
 /// `shaders/shared/angle.wgsl`: WGSL's own functions may be off by 2^-11.
@@ -323,17 +230,18 @@ pub struct GeometryDeltas {
 
 /// Geometry decoder 32-16-16-1, tanh. `w`: the decoder buffer.
 pub fn geometry_decoder(w: &[f32], f: &Features) -> GeometryState {
-    let h1 = relu(dense::<32, 16>(&w[..528], f));
-    let h2 = relu(dense::<16, 16>(&w[528..800], &h1));
-    let o: f32 = w[816] + (0..16).map(|k| w[800 + k] * h2[k]).sum::<f32>();
+    let [first, second, last] = GEOMETRY;
+    let h1 = relu(dense::<32, 16>(&w[first.weights..second.weights], f));
+    let h2 = relu(dense::<16, 16>(&w[second.weights..last.weights], &h1));
+    let o: f32 = w[last.bias] + (0..16).map(|k| w[last.weights + k] * h2[k]).sum::<f32>();
     GeometryState { h1, h2, distance: libm::tanhf(o) }
 }
 
 /// Deltas for dL/d(distance) = `g`.
 pub fn geometry_deltas(w: &[f32], s: &GeometryState, g: f32) -> GeometryDeltas {
     let d3 = g * (1.0 - s.distance * s.distance);
-    let d2 = mask(core::array::from_fn(|k| w[800 + k] * d3), &s.h2);
-    let d1 = mask(dense_back::<16, 16>(&w[528..], &d2), &s.h1);
+    let d2 = mask(core::array::from_fn(|k| w[GEOMETRY[2].weights + k] * d3), &s.h2);
+    let d1 = mask(dense_back::<16, 16>(&w[GEOMETRY[1].weights..], &d2), &s.h1);
     GeometryDeltas { d1, d2, d3 }
 }
 
@@ -342,42 +250,47 @@ pub fn geometry_feature_gradient(w: &[f32], d: &GeometryDeltas) -> Features {
     dense_back::<32, 16>(w, &d.d1)
 }
 
-/// The part of the decoder buffer that holds the colour and semantic decoders.
+/// The part of the decoder buffer that holds the color and semantic decoders.
 pub fn surface_weights(decoders: &[f32]) -> &[f32] {
     &decoders[GEOMETRY_FLOATS..GEOMETRY_FLOATS + SURFACE_FLOATS]
 }
 
-/// Hidden layer of the colour decoder. `w`: [`surface_weights`].
+/// A layer within [`surface_weights`].
+fn within(w: &[f32], layer: Layer) -> &[f32] {
+    &w[layer.weights - GEOMETRY_FLOATS..]
+}
+
+/// Hidden layer of the color decoder. `w`: [`surface_weights`].
 pub fn color_hidden(w: &[f32], f: &Features) -> [f32; 32] {
     relu(dense::<32, 32>(w, f))
 }
 
 /// sRGB in 0..1.
 pub fn color_output(w: &[f32], h: &[f32; 32]) -> Vec3 {
-    let o = dense::<32, 4>(&w[1056..], h);
+    let o = dense::<32, 4>(within(w, COLOR[1]), h);
     core::array::from_fn(|k| 1.0 / (1.0 + libm::expf(-o[k])))
 }
 
-/// From the gradient at the colour's pre-activation to (hidden deltas, feature gradient).
+/// From the gradient at the color's pre-activation to (hidden deltas, feature gradient).
 pub fn color_backward(w: &[f32], h: &[f32; 32], d: &[f32; 4]) -> ([f32; 32], Features) {
-    let dh = mask(dense_back::<32, 4>(&w[1056..], d), h);
+    let dh = mask(dense_back::<32, 4>(within(w, COLOR[1]), d), h);
     (dh, dense_back::<32, 32>(w, &dh))
 }
 
 /// Hidden layer of the semantic decoder.
 pub fn semantic_hidden(w: &[f32], f: &Features) -> [f32; 32] {
-    relu(dense::<32, 32>(&w[1188..], f))
+    relu(dense::<32, 32>(within(w, SEMANTIC[0]), f))
 }
 
 /// The semantic feature.
 pub fn semantic_output(w: &[f32], h: &[f32; 32]) -> [f32; 16] {
-    dense::<32, 16>(&w[2244..], h)
+    dense::<32, 16>(within(w, SEMANTIC[1]), h)
 }
 
 /// From the gradient at the semantic feature to (hidden deltas, plane feature gradient).
 pub fn semantic_backward(w: &[f32], h: &[f32; 32], d: &[f32; 16]) -> ([f32; 32], Features) {
-    let dh = mask(dense_back::<32, 16>(&w[2244..], d), h);
-    (dh, dense_back::<32, 32>(&w[1188..], &dh))
+    let dh = mask(dense_back::<32, 16>(within(w, SEMANTIC[1]), d), h);
+    (dh, dense_back::<32, 32>(within(w, SEMANTIC[0]), &dh))
 }
 
 /// Weights of class `c` in the head.

@@ -1,26 +1,14 @@
 //! Layers on the token grid: linear, 3x3 or depthwise convolution.
-use super::{
-    CpuDispatch, load_f32, store_f32,
-    tokens::{NO_BIAS, SLOPE, TokenParams, for_each_layer_workgroup},
-};
+use super::tokens::{NO_BIAS, SLOPE, TokenParams, for_each_layer_workgroup};
+use crate::kernel::{CpuDispatch, load_f32, store_f32};
 use alloc::vec;
 
-kernel! {
-    /// Layers whose inputs and outputs lie side by side in a token's row; none reads what another
-    /// one of the dispatch writes.
-    pub static TOKEN_LAYER = "token_layer" {
-        workgroup_size: 64,
-        params: TokenParams,
-        twin: twin,
-        bindings: [layers: Read, parameters: Read, raw: Read, tokens: ReadWrite],
-    }
-}
+kernel! { pub static TOKEN_LAYER = mte_slam_shaders::kernels::token_layer, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: TokenParams = dispatch.params();
-    let (w, raw) = (dispatch.read_f32(1), dispatch.read_f32(2));
-    let tokens = dispatch.write(3);
-    for_each_layer_workgroup(dispatch, &p, |l, group| {
+    let Views { layers, parameters: w, raw, tokens } = dispatch.views();
+    for_each_layer_workgroup(dispatch, &p, layers, |l, group| {
         let (inputs, outputs) = (l.inputs as usize, l.outputs as usize);
         let reach = l.taps as i32 / 2;
         // The shader's invocation is a (token, four outputs); here a token at a time is faster.

@@ -1,25 +1,15 @@
 //! Gradients at the inputs of layers on the token grid.
-use super::{
-    CpuDispatch, load_f32, store_f32,
-    tokens::{SLOPE, TokenParams, for_each_layer_workgroup},
-};
+use super::tokens::{SLOPE, TokenParams, for_each_layer_workgroup};
+use crate::kernel::{CpuDispatch, load_f32, store_f32};
 use alloc::vec;
 
-kernel! {
-    /// Adds layers' contributions to the gradients at their inputs, of which no two share any.
-    pub static TOKEN_LAYER_BACKWARD = "token_layer_backward" {
-        workgroup_size: 64,
-        params: TokenParams,
-        twin: twin,
-        bindings: [layers: Read, parameters: Read, tokens: Read, token_gradient: ReadWrite],
-    }
-}
+kernel! { pub static TOKEN_LAYER_BACKWARD = mte_slam_shaders::kernels::token_layer_backward, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: TokenParams = dispatch.params();
-    let (w, tokens) = (dispatch.read_f32(1), dispatch.read_f32(2));
-    let (gradient, stride) = (dispatch.write(3), p.stride as usize);
-    for_each_layer_workgroup(dispatch, &p, |l, group| {
+    let Views { layers, parameters: w, tokens, token_gradient: gradient } = dispatch.views();
+    let stride = p.stride as usize;
+    for_each_layer_workgroup(dispatch, &p, layers, |l, group| {
         let (inputs, outputs) = (l.inputs as usize, l.outputs as usize);
         let reach = l.taps as i32 / 2;
         let first = group * 64;

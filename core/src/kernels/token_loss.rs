@@ -1,40 +1,27 @@
-//! What trains the fusion: classes and colour read from F. F is also the rays' target.
+//! What trains the fusion: classes and color read from F. F is also the rays' target.
 use super::{
-    CpuDispatch,
     gate_tokens::sigmoid,
-    load_f32,
     shared::{class_logit, head_row},
-    store_f32,
     tokens::{
         COLOR_AT, FUSED_AT, LOGITS_AT, RAW_HISTOGRAM, RAW_MEAN, RAW_POINT, TokenParams, sixteen,
     },
 };
+use crate::kernel::{CpuDispatch, load_f32, store_f32};
 use crate::layout::TARGET_FLOATS;
 
-kernel! {
-    /// Class-balanced cross-entropy and colour loss of F, their gradients, and the rays' targets.
-    pub static TOKEN_LOSS = "token_loss" {
-        workgroup_size: 64,
-        params: TokenParams,
-        twin: twin,
-        bindings: [
-            parameters: Read,
-            decoders: Read,
-            class_weights: Read,
-            raw: Read,
-            tokens: ReadWrite,
-            token_gradient: ReadWrite,
-            targets: ReadWrite,
-        ],
-    }
-}
+kernel! { pub static TOKEN_LOSS = mte_slam_shaders::kernels::token_loss, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: TokenParams = dispatch.params();
-    let (w, decoders) = (dispatch.read_f32(0), dispatch.read_f32(1));
-    let (class_weights, raw) = (dispatch.read_f32(2), dispatch.read_f32(3));
-    let (tokens, gradient) = (dispatch.write(4), dispatch.write(5));
-    let targets = dispatch.write(6);
+    let Views {
+        parameters: w,
+        decoders,
+        class_weights,
+        raw,
+        tokens,
+        token_gradient: gradient,
+        targets,
+    } = dispatch.views();
     let inv = 1.0 / p.tokens() as f32;
     dispatch.for_each_invocation(|token| {
         if token >= p.tokens() {

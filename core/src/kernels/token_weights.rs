@@ -1,33 +1,16 @@
 //! Gradients of the weights of layers on the token grid.
-use super::{
-    CpuDispatch, load_f32, store_f32,
-    tokens::{NO_BIAS, SLOPE, TokenParams, for_each_layer_workgroup},
-};
+use super::tokens::{NO_BIAS, SLOPE, TokenParams, for_each_layer_workgroup};
+use crate::kernel::{CpuDispatch, load_f32, store_f32};
 use alloc::vec;
 
-kernel! {
-    /// dW = sum over tokens of input x delta, in chunks of tokens.
-    pub static TOKEN_WEIGHTS = "token_weights" {
-        workgroup_size: 64,
-        params: TokenParams,
-        twin: twin,
-        bindings: [
-            layers: Read,
-            raw: Read,
-            tokens: Read,
-            token_gradient: ReadWrite,
-            partials: ReadWrite,
-        ],
-    }
-}
+kernel! { pub static TOKEN_WEIGHTS = mte_slam_shaders::kernels::token_weights, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: TokenParams = dispatch.params();
-    let (raw, tokens) = (dispatch.read_f32(1), dispatch.read_f32(2));
-    let (gradient, partials) = (dispatch.write(3), dispatch.write(4));
+    let Views { layers, raw, tokens, token_gradient: gradient, partials } = dispatch.views();
     let stride = p.stride as usize;
     let chunks = p.tokens().div_ceil(p.chunk as usize);
-    for_each_layer_workgroup(dispatch, &p, |l, group| {
+    for_each_layer_workgroup(dispatch, &p, layers, |l, group| {
         let (inputs, outputs) = (l.inputs as usize, l.outputs as usize);
         let taps = (l.taps * l.taps) as usize;
         let depthwise = l.depthwise == 1;

@@ -1,45 +1,16 @@
 //! Anchors follow the features matched to them (paper eqs. 11, 12).
-use super::{CpuDispatch, load_f32, shared::Ray, store_f32, store_u32};
+pub use mte_slam_shaders::kernels::update_anchors::UpdateAnchorsParams;
+
+use crate::kernel::{CpuDispatch, load_f32, store_f32, store_u32};
 use crate::layout::{ANCHOR_FLOATS, FEATURE, RAY_STATE_FLOATS, STATE_ANCHOR, STATE_FEATURE};
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
-params! {
-    /// Parameters of [`UPDATE_ANCHORS`].
-    pub struct UpdateAnchorsParams {
-        /// Rays of the batch.
-        rays: u32,
-        /// Slots of anchors.
-        anchors: u32,
-        /// Classes.
-        classes: u32,
-        /// 0: moving average with `beta` (11), 1: running mean (12).
-        rule: u32,
-        /// Weight of a new feature.
-        beta: f32,
-        /// Matches that the running mean remembers at most.
-        memory: f32,
-        /// What importance and votes keep at each update.
-        decay: f32,
-        /// What the temporal variation keeps at each update.
-        variation_decay: f32,
-    }
-}
-
-kernel! {
-    /// One update of every anchor from a batch's features; its class is that of most votes.
-    pub static UPDATE_ANCHORS = "update_anchors" {
-        workgroup_size: 64,
-        params: UpdateAnchorsParams,
-        twin: twin,
-        bindings: [rays: Read, ray_state: Read, anchors: ReadWrite, votes: ReadWrite],
-    }
-}
+kernel! { pub static UPDATE_ANCHORS = mte_slam_shaders::kernels::update_anchors, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: UpdateAnchorsParams = dispatch.params();
-    let (ray_words, ray_state) = (dispatch.read_f32(0), dispatch.read_f32(1));
-    let (anchors, votes) = (dispatch.write(2), dispatch.write(3));
+    let Views { rays: ray_words, ray_state, anchors, votes } = dispatch.views();
     let classes = p.classes as usize;
     dispatch.for_each_workgroup(|index| {
         let anchor = &anchors[index as usize * ANCHOR_FLOATS..(index as usize + 1) * ANCHOR_FLOATS];
@@ -56,7 +27,7 @@ fn twin(dispatch: &CpuDispatch<'_>) {
             if state[STATE_ANCHOR as usize * 4].to_bits() != index {
                 continue;
             }
-            let ray = Ray::load(ray_words, ray);
+            let ray = ray_words[ray];
             if ray.masked() {
                 continue;
             }

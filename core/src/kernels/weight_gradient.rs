@@ -1,51 +1,14 @@
 //! Gradients of the decoders that run once a ray.
-use super::{CpuDispatch, store_f32};
+pub use mte_slam_shaders::kernels::weight_gradient::WeightGradientParams;
+
+use crate::kernel::{CpuDispatch, store_f32};
 use crate::layout::RAY_STATE_FLOATS;
 
-params! {
-    /// Parameters of [`WEIGHT_GRADIENT`].
-    pub struct WeightGradientParams {
-        /// Rays.
-        rays: u32,
-        /// Inputs of the layer.
-        inputs: u32,
-        /// Outputs of the layer.
-        outputs: u32,
-        /// Rays a chunk; a chunk is a row of partials.
-        chunk: u32,
-        /// Offset of the inputs in a ray's state \[floats\].
-        input_offset: u32,
-        /// Offset of the deltas in a ray's state \[floats\].
-        delta_offset: u32,
-        /// 1: the deltas are the logits' gradients.
-        from_logits: u32,
-        /// Floats a row of partials.
-        row: u32,
-        /// Where the weights start in a row.
-        weight_offset: u32,
-        /// Where the bias starts in a row.
-        bias_offset: u32,
-        /// Floats from one input's weights to the next one's.
-        input_stride: u32,
-        /// Floats from one output's weights to the next one's.
-        output_stride: u32,
-    }
-}
-
-kernel! {
-    /// dW = sum over rays of input x delta, in chunks of rays.
-    pub static WEIGHT_GRADIENT = "weight_gradient" {
-        workgroup_size: 64,
-        params: WeightGradientParams,
-        twin: twin,
-        bindings: [ray_state: Read, logits_gradient: Read, partials: ReadWrite],
-    }
-}
+kernel! { pub static WEIGHT_GRADIENT = mte_slam_shaders::kernels::weight_gradient, twin }
 
 fn twin(dispatch: &CpuDispatch<'_>) {
     let p: WeightGradientParams = dispatch.params();
-    let (ray_state, logits) = (dispatch.read_f32(0), dispatch.read_f32(1));
-    let partials = dispatch.write(2);
+    let Views { ray_state, logits_gradient: logits, partials } = dispatch.views();
     let quads = p.outputs.div_ceil(4);
     let per_chunk = ((p.inputs + 1) * quads) as usize;
     let chunks = p.rays.div_ceil(p.chunk) as usize;

@@ -1,16 +1,10 @@
 //! What a pass is asked to do: rays, losses, rates.
-use super::Map;
-use crate::{
-    camera::Camera,
-    config::LossConfig,
-    kernels::shared::{FLAG_ANCHORS, FLAG_MAP},
-    layout::FieldParams,
-};
+use crate::{camera::Camera, config::LossConfig, layout::FieldParams};
 use bytemuck::{Pod, Zeroable};
 
 /// Fixed-point quanta per unit of gradient and ray. A surface hit by every ray of a batch stays
 /// 2^10 below saturation; a residual of 1e-4 still moves several quanta.
-const QUANTA: [f32; 3] = [262_144.0, 262_144.0, 1_048_576.0];
+pub(super) const QUANTA: [f32; 3] = [262_144.0, 262_144.0, 1_048_576.0];
 
 /// One batch of rays.
 #[derive(Clone, Copy, Debug)]
@@ -91,40 +85,4 @@ pub(super) fn set_camera(p: &mut FieldParams, camera: &Camera) {
     p.fy = camera.fy as f32;
     p.cx = camera.cx as f32;
     p.cy = camera.cy as f32;
-}
-
-impl Map {
-    /// The kernels' parameters for a batch.
-    pub(super) fn params(&self, b: &Batch<'_>) -> FieldParams {
-        let mut p = self.base;
-        if let Some(camera) = b.camera {
-            set_camera(&mut p, camera);
-        }
-        p.rays = b.rays();
-        p.rays_per_frame = b.rays_per_frame;
-        p.samples = b.samples();
-        p.stratified = b.stratified;
-        p.surface_samples = b.surface;
-        p.flags = b.flags;
-        p.iteration = b.iteration;
-        p.first = b.first;
-        p.rare_share = b.rare_share as f32;
-        p.weight_free = b.loss.free_space as f32;
-        p.weight_centre = b.loss.centre as f32;
-        p.weight_tail = b.loss.tail as f32;
-        p.weight_depth = b.loss.depth as f32;
-        p.weight_color = b.loss.color as f32;
-        p.weight_semantic = b.loss.semantic as f32;
-        let s = &b.supervision;
-        p.weight_compression = s.compression as f32;
-        p.weight_feature = s.feature as f32;
-        p.doubt_anchor = s.doubt_anchor as f32;
-        p.doubt_fused = s.doubt_fused as f32;
-        if b.flags & (FLAG_MAP | FLAG_ANCHORS) != 0 {
-            p.anchors = self.anchor_slots();
-        }
-        [p.scale_geometry, p.scale_appearance, p.scale_semantic] =
-            QUANTA.map(|q| q * b.rays() as f32);
-        p
-    }
 }

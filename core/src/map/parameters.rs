@@ -1,22 +1,22 @@
 //! Parameter tensors, and Adam's steps on them.
 use crate::{
+    commands::{Buffer, Commands},
     engine::{Engine, EngineError},
     kernels::adam::{self, AdamParams},
-    recording::{BufferId, Recording},
 };
 use core::ops::Range;
 
 /// A parameter tensor with its gradient and Adam's moments.
 #[derive(Clone, Copy, Debug)]
 pub struct ParameterTensor {
-    /// Values.
-    pub values: BufferId,
+    /// Values. Kernels read planes and decoders by fours, everything else by floats.
+    pub values: Buffer<[f32; 4]>,
     /// Gradients: fixed-point i32 for planes, f32 for decoders.
-    pub gradient: BufferId,
+    pub gradient: Buffer<i32>,
     /// First moments.
-    pub moment1: BufferId,
+    pub moment1: Buffer<f32>,
     /// Second moments.
-    pub moment2: BufferId,
+    pub moment2: Buffer<f32>,
     /// Number of floats.
     pub floats: usize,
 }
@@ -28,22 +28,23 @@ impl ParameterTensor {
         floats: usize,
     ) -> Result<ParameterTensor, EngineError> {
         Ok(ParameterTensor {
-            values: engine.create_buffer(name, floats)?,
-            gradient: engine.create_buffer(name, floats)?,
-            moment1: engine.create_buffer(name, floats)?,
-            moment2: engine.create_buffer(name, floats)?,
+            values: engine.create(name, floats)?,
+            gradient: engine.create(name, floats)?,
+            moment1: engine.create(name, floats)?,
+            moment2: engine.create(name, floats)?,
             floats,
         })
     }
 
     pub(super) fn destroy(&self, engine: &mut Engine) {
-        for b in [self.values, self.gradient, self.moment1, self.moment2] {
-            engine.destroy_buffer(b);
-        }
+        engine.destroy_buffer(self.values);
+        engine.destroy_buffer(self.gradient);
+        engine.destroy_buffer(self.moment1);
+        engine.destroy_buffer(self.moment2);
     }
 
     /// Records a step of Adam, which leaves parameters without gradient alone.
-    pub(super) fn record_adam(&self, r: &mut Recording, status: BufferId, step: AdamStep) {
+    pub(super) fn record_adam(&self, r: &mut Commands, status: Buffer<u32>, step: AdamStep) {
         let correction = |beta: f64| {
             let steps = step.number.min(1 << 20) as i32;
             (1.0 / (1.0 - num_traits::Float::powi(beta, steps))) as f32
@@ -63,7 +64,13 @@ impl ParameterTensor {
                 correction1: correction(0.9),
                 correction2: correction(0.999),
             },
-            &[self.values, self.gradient, self.moment1, self.moment2, status],
+            adam::Buffers {
+                parameters: self.values.floats(),
+                gradient: self.gradient.cast(),
+                moment1: self.moment1,
+                moment2: self.moment2,
+                status,
+            },
         );
     }
 }

@@ -1,12 +1,12 @@
 //! The buffers of one batch.
 use super::{FusionScratch, Map, SampleScratch};
 use crate::{
+    commands::{Buffer, Commands},
     config::Config,
     engine::{Engine, EngineError},
     field::decoder_floats,
-    kernels::shared::RAY_WORDS,
+    kernels::shared::{RAY_WORDS, Ray},
     layout::{GEOMETRY_FLOATS, RAY_OUT_FLOATS, RAY_STATE_FLOATS},
-    recording::{BufferId, Recording},
 };
 use alloc::vec::Vec;
 
@@ -28,23 +28,23 @@ pub struct Scratch {
     /// The same of the per-sample class head.
     pub sample_head: Option<SampleScratch>,
     /// Slots of the window's frames; bit 31: the pose is fixed.
-    pub(super) window: BufferId,
-    pub(super) rays: BufferId,
-    pub(super) depths: BufferId,
-    pub(super) distances: BufferId,
-    pub(super) weights: BufferId,
-    pub(super) distance_gradient: BufferId,
-    pub(super) features: BufferId,
-    pub(super) position_gradient: BufferId,
-    pub(super) ray_state: BufferId,
-    pub(super) ray_out: BufferId,
-    pub(super) logits_gradient: BufferId,
-    pub(super) geometry_partials: BufferId,
-    pub(super) decoder_partials: BufferId,
+    pub(super) window: Buffer<u32>,
+    pub(super) rays: Buffer<Ray>,
+    pub(super) depths: Buffer<f32>,
+    pub(super) distances: Buffer<f32>,
+    pub(super) weights: Buffer<f32>,
+    pub(super) distance_gradient: Buffer<f32>,
+    pub(super) features: Buffer<[f32; 4]>,
+    pub(super) position_gradient: Buffer<[f32; 4]>,
+    pub(super) ray_state: Buffer<[f32; 4]>,
+    pub(super) ray_out: Buffer<[f32; 4]>,
+    pub(super) logits_gradient: Buffer<f32>,
+    pub(super) geometry_partials: Buffer<[f32; 4]>,
+    pub(super) decoder_partials: Buffer<f32>,
     /// Points of a query.
-    pub(super) points: BufferId,
+    pub(super) points: Buffer<[f32; 4]>,
     /// What a query found at them.
-    pub(super) values: BufferId,
+    pub(super) values: Buffer<f32>,
 }
 
 impl Scratch {
@@ -74,30 +74,28 @@ impl Scratch {
             max_rays: max_rays as u32,
             fusion,
             sample_head,
-            window: e.create_buffer("window", WINDOW_MAX)?,
-            rays: e.create_buffer("rays", max_rays * RAY_WORDS)?,
-            depths: e.create_buffer("sample depths", total)?,
-            distances: e.create_buffer("distances", total)?,
-            weights: e.create_buffer("weights", total)?,
-            distance_gradient: e.create_buffer("distance gradients", total)?,
-            features: e.create_buffer("features", trained_samples * 32)?,
-            position_gradient: e.create_buffer("position gradients", trained_samples * 4)?,
-            ray_state: e.create_buffer("ray state", max_rays * RAY_STATE_FLOATS)?,
-            ray_out: e.create_buffer("ray outputs", max_rays * RAY_OUT_FLOATS)?,
-            logits_gradient: e.create_buffer("logits", (max_rays * classes as usize).max(4))?,
+            window: e.create("window", WINDOW_MAX)?,
+            rays: e.create("rays", max_rays * RAY_WORDS)?,
+            depths: e.create("sample depths", total)?,
+            distances: e.create("distances", total)?,
+            weights: e.create("weights", total)?,
+            distance_gradient: e.create("distance gradients", total)?,
+            features: e.create("features", trained_samples * 32)?,
+            position_gradient: e.create("position gradients", trained_samples * 4)?,
+            ray_state: e.create("ray state", max_rays * RAY_STATE_FLOATS)?,
+            ray_out: e.create("ray outputs", max_rays * RAY_OUT_FLOATS)?,
+            logits_gradient: e.create("logits", (max_rays * classes as usize).max(4))?,
             geometry_partials: e
-                .create_buffer("geometry partials", GEOMETRY_ROWS as usize * GEOMETRY_FLOATS)?,
-            decoder_partials: e.create_buffer(
-                "decoder partials",
-                rows * (decoder_floats(classes) - GEOMETRY_FLOATS),
-            )?,
-            points: e.create_buffer("points", QUERY_POINTS_MAX * 4)?,
-            values: e.create_buffer("values", QUERY_POINTS_MAX * 8)?,
+                .create("geometry partials", GEOMETRY_ROWS as usize * GEOMETRY_FLOATS)?,
+            decoder_partials: e
+                .create("decoder partials", rows * (decoder_floats(classes) - GEOMETRY_FLOATS))?,
+            points: e.create("points", QUERY_POINTS_MAX * 4)?,
+            values: e.create("values", QUERY_POINTS_MAX * 8)?,
         })
     }
 
     /// Sets the window: slots, and whether each pose is fixed.
-    pub fn upload_window(&self, r: &mut Recording, window: &[(u32, bool)]) {
+    pub fn upload_window(&self, r: &mut Commands, window: &[(u32, bool)]) {
         let words: Vec<u32> =
             window.iter().map(|(slot, fixed)| slot | (u32::from(*fixed) << 31)).collect();
         r.upload(self.window, 0, &words);

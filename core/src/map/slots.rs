@@ -1,21 +1,44 @@
 //! The stored frames: images, poses and fused features, by slot.
-use super::{FrameFormat, Map};
 use crate::{
     camera::Camera,
     classes::UNLABELLED,
+    commands::{Buffer, Commands},
     config::{Config, FusionConfig},
     engine::{Engine, EngineError},
-    frame::{FeatureMap, Frame},
+    frame::{FeatureMap, Frame, SequenceInfo},
     kernels::pose_step::POSE_STATE_FLOATS,
     layout::TARGET_FLOATS,
     pose::Pose,
-    recording::{BufferId, Recording},
 };
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
 
 /// Floats of a pose.
 const POSE_FLOATS: usize = 12;
+
+/// What all frames of a sequence share, as far as buffers depend on it.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameFormat {
+    /// Camera of the images.
+    pub camera: Camera,
+    /// Metres per unit of depth.
+    pub depth_unit_m: f64,
+    /// Number of classes; 0 without labels.
+    pub classes: u32,
+    /// Channels of the feature maps that the fusion reads in place of label histograms; 0 without.
+    pub feature_channels: u32,
+}
+
+impl From<&SequenceInfo> for FrameFormat {
+    fn from(info: &SequenceInfo) -> FrameFormat {
+        FrameFormat {
+            camera: info.camera,
+            depth_unit_m: info.depth_unit_m,
+            classes: info.classes.len() as u32,
+            feature_channels: info.feature_channels as u32,
+        }
+    }
+}
 
 /// The grid of tokens over a frame.
 #[derive(Clone, Copy, Debug)]
@@ -60,17 +83,17 @@ pub struct FrameSlots {
     /// Channels of feature maps; 0 without.
     channels: u32,
     /// Rotation row-major, translation.
-    pub(super) poses: BufferId,
+    pub(super) poses: Buffer<f32>,
     /// Adam's moments of the poses, and the best pose so far.
-    pub(super) pose_state: BufferId,
+    pub(super) pose_state: Buffer<f32>,
     /// Colour and label, a byte each.
-    pub(super) color_images: BufferId,
+    pub(super) color_images: Buffer<u32>,
     /// Depth, two pixels per word.
-    pub(super) depth_images: BufferId,
+    pub(super) depth_images: Buffer<u32>,
     /// Feature maps on the token grid.
-    pub(super) feature_maps: BufferId,
+    pub(super) feature_maps: Buffer<f32>,
     /// Fused features of the tokens: what the rays' features are trained to be.
-    pub(super) targets: BufferId,
+    pub(super) targets: Buffer<[f32; 4]>,
 }
 
 impl FrameSlots {
@@ -95,12 +118,12 @@ impl FrameSlots {
             camera,
             grid,
             channels: format.feature_channels,
-            poses: e.create_buffer("poses", count * POSE_FLOATS)?,
-            pose_state: e.create_buffer("pose state", count * POSE_STATE_FLOATS)?,
-            color_images: e.create_buffer("color images", count * pixels)?,
-            depth_images: e.create_buffer("depth images", count * pixels.div_ceil(2))?,
-            feature_maps: e.create_buffer("feature maps", (count * maps).max(4))?,
-            targets: e.create_buffer("targets", (count * targets).max(4))?,
+            poses: e.create("poses", count * POSE_FLOATS)?,
+            pose_state: e.create("pose state", count * POSE_STATE_FLOATS)?,
+            color_images: e.create("color images", count * pixels)?,
+            depth_images: e.create("depth images", count * pixels.div_ceil(2))?,
+            feature_maps: e.create("feature maps", (count * maps).max(4))?,
+            targets: e.create("targets", (count * targets).max(4))?,
         })
     }
 
@@ -111,7 +134,7 @@ impl FrameSlots {
 
     /// Stores a frame's images in a slot, and forgets the pose optimiser's state of the slot's
     /// former frame.
-    pub fn upload_frame(&self, r: &mut Recording, slot: u32, frame: &Frame) {
+    pub fn upload_frame(&self, r: &mut Commands, slot: u32, frame: &Frame) {
         let pixels = self.camera.pixels();
         let color = color_words(frame);
         let depth: Vec<u32> = frame
@@ -127,7 +150,7 @@ impl FrameSlots {
         }
     }
 
-    fn upload_features(&self, r: &mut Recording, slot: u32, grid: &TokenGrid, map: &FeatureMap) {
+    fn upload_features(&self, r: &mut Commands, slot: u32, grid: &TokenGrid, map: &FeatureMap) {
         if map.channels != self.channels as usize {
             return;
         }
@@ -154,12 +177,12 @@ impl FrameSlots {
     }
 
     /// Replaces colour and label of a slot's pixels.
-    pub fn upload_color(&self, r: &mut Recording, slot: u32, image: &[[u8; 4]]) {
+    pub fn upload_color(&self, r: &mut Commands, slot: u32, image: &[[u8; 4]]) {
         r.upload(self.color_images, slot as usize * self.camera.pixels(), image);
     }
 
     /// Sets the pose of a slot.
-    pub fn upload_pose(&self, r: &mut Recording, slot: u32, pose: &Pose) {
+    pub fn upload_pose(&self, r: &mut Commands, slot: u32, pose: &Pose) {
         r.upload(self.poses, slot as usize * POSE_FLOATS, &pose_words(pose));
     }
 
@@ -187,13 +210,6 @@ impl FrameSlots {
     ) -> Result<Vec<f32>, EngineError> {
         let at = slot as usize * POSE_STATE_FLOATS;
         engine.read_as(self.pose_state, at, POSE_STATE_FLOATS).await
-    }
-}
-
-impl Map {
-    /// Number of slots of frames; slot 0 is for tracking and views.
-    pub fn slots(&self) -> u32 {
-        self.frames.count
     }
 }
 

@@ -3,7 +3,10 @@
 //! Kept are the map with Adam's moments, poses, counters, the odometer's numbers and the small
 //! depth images that meshes are culled with. Keyframes' images are not: they are read from the
 //! recording again (`resume.rs`), and each frame's hash tells whether it is the same recording.
-use super::{Observation, PoseEstimate, Slam, SlamError, TrackingStatus};
+use super::{
+    PoseEstimate, Slam, SlamError, TrackingStatus,
+    keyframes::{Observation, observation_step},
+};
 use crate::{
     camera::Camera,
     classes::ClassTable,
@@ -12,7 +15,7 @@ use crate::{
     hash::Hasher,
     map::{AnchorCounts, Counters},
     pose::Pose,
-    track::odometry::{ColourRegistration, OdometerState},
+    track::odometry::{ColorRegistration, OdometerState},
 };
 use alloc::{
     collections::BTreeMap,
@@ -141,7 +144,7 @@ pub(super) struct State {
     pub keyframes: Vec<SavedKeyframe>,
     pub observed_frames: Vec<usize>,
     pub anchor_history: Vec<(usize, AnchorCounts)>,
-    pub registrations: Vec<(usize, ColourRegistration)>,
+    pub registrations: Vec<(usize, ColorRegistration)>,
     pub odometer: OdometerState,
 }
 
@@ -174,6 +177,15 @@ fn configuration_hash(json: &str) -> String {
     let mut h = Hasher::default();
     h.bytes(json.as_bytes());
     format!("{:016x}", h.finish())
+}
+
+/// The configuration in the text of a state, as it was written: that of an earlier version may lack
+/// settings, and written again it would have them. `None` where it does not stand first.
+fn recorded_configuration(state: &str) -> Option<&str> {
+    let text = state.strip_prefix("{\"config\":")?;
+    let mut values = serde_json::Deserializer::from_str(text).into_iter::<serde::de::IgnoredAny>();
+    values.next()?.ok()?;
+    text.get(..values.byte_offset())
 }
 
 /// A hash of a sequence and the frames that were processed.
@@ -218,8 +230,7 @@ impl Slam {
         let statuses: Vec<u32> = self.frames.iter().map(|f| f.status as u32).collect();
         tensors.push(tensor("frames.status", Dtype::U32, vec![n], &statuses));
         tensors.push(tensor("frames.hash", Dtype::U64, vec![n], &self.hashes));
-        let camera =
-            self.info.camera.downscaled(super::mapping::observation_step(self.info.camera.width));
+        let camera = self.info.camera.downscaled(observation_step(self.info.camera.width));
         let (w, h) = (camera.width as usize, camera.height as usize);
         let mut depths = Vec::with_capacity(w * h * self.observations.len());
         self.observations.iter().for_each(|o| depths.extend_from_slice(&o.depth));
@@ -299,7 +310,10 @@ impl Checkpoint {
             .map_err(|e| wrong("state", e, "the state of a run"))?;
         let n = self.frames().unwrap_or(0);
         let hashes: Vec<u64> = self.values("frames.hash", Dtype::U64, n)?;
-        let hash = configuration_hash(&json(&state.config)?);
+        let hash = match recorded_configuration(entry("state")?) {
+            Some(text) => configuration_hash(text),
+            None => configuration_hash(&json(&state.config)?),
+        };
         if *entry("configuration")? != hash {
             return Err(wrong("configuration", entry("configuration")?, hash));
         }
@@ -333,7 +347,7 @@ impl Checkpoint {
             });
         }
         let camera = state.sequence.camera;
-        let small = camera.downscaled(super::mapping::observation_step(camera.width)).pixels();
+        let small = camera.downscaled(observation_step(camera.width)).pixels();
         let observed = &state.observed_frames;
         let depths: Vec<u16> =
             self.values("observations.depth", Dtype::U16, small.saturating_mul(observed.len()))?;

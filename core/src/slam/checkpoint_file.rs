@@ -111,7 +111,7 @@ impl Checkpoint {
             checkpoint.metadata =
                 serde_json::from_value(metadata).map_err(|e| wrong("metadata", e, "texts"))?;
         }
-        for safetensors::Tensor { name, dtype: named, shape, bytes } in file.tensors {
+        for safetensors::TensorView { name, dtype: named, shape, bytes } in file.tensors {
             let Some(dtype) = Dtype::ALL.into_iter().find(|d| named == d.name()) else {
                 let field = format!("tensor {name}: dtype");
                 return Err(wrong(field, named, "F32, F64, U16, U32 or U64"));

@@ -1,6 +1,9 @@
 //! A mesh that follows the map while it grows: only the parts that new frames have touched are
 //! extracted again, in chunks that a viewer can replace one by one.
-use super::{Observation, PoseEstimate, Slam, SlamError, mapping::observation_step};
+use super::{
+    PoseEstimate, Slam, SlamError,
+    keyframes::{Observation, observation_step},
+};
 use crate::{
     camera::Camera,
     classes::UNLABELLED,
@@ -152,7 +155,7 @@ impl Slam {
                 let Some(f) = self.frames.get(o.frame) else { continue };
                 let world_from_camera = f.world_from_camera;
                 let (camera, depth, depth_unit_m) = (&camera, &o.depth[..], unit);
-                let view = mesh::View { camera, world_from_camera, depth, depth_unit_m };
+                let view = mesh::CullingView { camera, world_from_camera, depth, depth_unit_m };
                 seen.add_view(&chunk.mesh, &view, protocol);
             }
             mesh::cull(&mut chunk.mesh, &seen, Keep::AllSeen);

@@ -1,8 +1,9 @@
 //! What comes out of a map: rendered views and meshes.
-use super::{Slam, SlamError, VIEW_SLOT, mapping::observation_step};
+use super::{Slam, SlamError, keyframes::observation_step, system::VIEW_SLOT};
 use crate::{
     camera::Camera,
     classes::UNLABELLED,
+    commands::Commands,
     engine::Engine,
     frame::Frame,
     kernels::shared::{FLAG_ANCHORS, FLAG_DENSE, FLAG_GUIDED},
@@ -10,7 +11,6 @@ use crate::{
     map::{Batch, Map, Scratch, SemanticSupervision, passes},
     mesh::{self, BlockMesher, ComponentSize, CullProtocol, Keep, Mesh, Visibility},
     pose::Pose,
-    recording::Recording,
 };
 use alloc::vec::Vec;
 
@@ -87,7 +87,7 @@ impl Slam {
                 rare_share: 0.0,
                 supervision: SemanticSupervision::default(),
             };
-            let mut r = Recording::default();
+            let mut r = Commands::default();
             if let (Some(frame), 0) = (guide, first) {
                 map.frames.upload_frame(&mut r, VIEW_SLOT, frame);
             }
@@ -143,7 +143,7 @@ impl Slam {
         let mut seen = Visibility::new(&mesh);
         for (i, o) in self.observations.iter().enumerate() {
             let Some(f) = self.frames.get(o.frame) else { continue };
-            let view = mesh::View {
+            let view = mesh::CullingView {
                 camera: &camera,
                 world_from_camera: f.world_from_camera,
                 depth: &o.depth,

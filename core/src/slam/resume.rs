@@ -1,17 +1,17 @@
 //! A run again from its checkpoint: to be shown, or to go on.
 use super::{
-    Slam, SlamError,
+    MapKeyframe, Slam, SlamError,
     checkpoint::{Checkpoint, Dtype, Saved, SequenceState, wrong},
+    class_counts::ClassCounts,
 };
 use crate::{
+    commands::Commands,
     config::Config,
     engine::Engine,
     field::FieldShape,
     frame::{Frame, SequenceInfo},
-    keyframe::Keyframe,
     map::{FrameFormat, Map, Scratch, color_words},
-    recording::Recording,
-    track::odometry::{ColourRegistration, OdometryConfig, Rebuild, since},
+    track::odometry::{ColorRegistration, Rebuild, since},
 };
 use alloc::{collections::BTreeSet, format, string::String, vec::Vec};
 use serde::Serialize;
@@ -55,7 +55,7 @@ impl Slam {
         same("sequence", &saved.state.sequence, &named)?;
         let slam = build(engine, config, info, checkpoint, &saved)?;
         let pose_state = slam.saved_words(checkpoint, "slots.pose_state")?;
-        let odometer = Rebuild::new(OdometryConfig::default(), saved.state.odometer.clone());
+        let odometer = Rebuild::new(slam.config.odometry.clone(), saved.state.odometer.clone());
         let mut missing: BTreeSet<usize> = slam.keyframes.iter().map(|k| k.frame).collect();
         missing.extend(saved.state.odometer.frames());
         Ok(Resuming { slam, saved, odometer, missing, pose_state })
@@ -121,11 +121,11 @@ impl Resuming {
             let mut before = first;
             for (_, found) in later {
                 let image = colors.unwrap_or_else(|| color_words(&stored));
-                let change = ColourRegistration { scale: found.scale / before.scale };
+                let change = ColorRegistration { scale: found.scale / before.scale };
                 colors = Some(change.resampled(&image, &camera));
                 before = *found;
             }
-            let mut r = Recording::default();
+            let mut r = Commands::default();
             for slot in slots {
                 map.frames.upload_frame(&mut r, slot, &stored);
                 if let Some(image) = &colors {
@@ -151,7 +151,7 @@ impl Resuming {
         if let Some(map) = &slam.map {
             let buffers = map.state_buffers(slam.used_slots);
             if let Some(b) = buffers.iter().find(|b| b.name == "slots.pose_state") {
-                let mut r = Recording::default();
+                let mut r = Commands::default();
                 r.upload(b.buffer, 0, &pose_state);
                 slam.engine.submit(&r)?;
             }
@@ -192,7 +192,7 @@ fn build(
         if b.finite && words.iter().any(|w| !f32::from_bits(*w).is_finite()) {
             return Err(wrong(b.name, "a value that is not finite", "finite values"));
         }
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         r.upload(b.buffer, 0, &words);
         engine.submit(&r)?;
     }
@@ -202,7 +202,7 @@ fn build(
     slam.mapping_calls = state.mapping_calls;
     slam.finished_iterations = state.finished_iterations;
     slam.bounds_refused = state.bounds_refused;
-    slam.class_counts = super::semantics::ClassCounts(state.class_counts.clone());
+    slam.class_counts = ClassCounts(state.class_counts.clone());
     slam.free_slots.clone_from(&state.free_slots);
     slam.used_slots = state.used_slots;
     slam.anchor_history.clone_from(&state.anchor_history);
@@ -211,7 +211,11 @@ fn build(
     slam.keyframes = state
         .keyframes
         .iter()
-        .map(|k| Keyframe { frame: k.frame, slot: k.slot, world_from_camera: k.world_from_camera })
+        .map(|k| MapKeyframe {
+            frame: k.frame,
+            slot: k.slot,
+            world_from_camera: k.world_from_camera,
+        })
         .collect();
     Ok(slam)
 }

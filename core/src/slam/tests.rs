@@ -1,6 +1,12 @@
 //! The loop as a whole, on small frames of the built-in room.
 use super::*;
-use crate::{camera::Camera, sequence::Sequence};
+use crate::{
+    camera::Camera,
+    config::Config,
+    engine::Engine,
+    frame::{Frame, SequenceInfo},
+    sequence::Sequence,
+};
 use alloc::{vec, vec::Vec};
 use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
 use pollster::block_on;
@@ -83,7 +89,7 @@ fn the_map_gets_its_colours_where_the_odometer_found_them() {
         frames.push((frame, registered));
     }
     block_on(slam.finish()).unwrap();
-    let found = slam.colour_registration().scale;
+    let found = slam.color_registration().scale;
     assert!((found - SCALE).abs() < 0.02, "{found}");
     // The first frame was stored long before anything was known.
     let first = slam.keyframes[0].clone();

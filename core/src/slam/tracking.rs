@@ -1,16 +1,17 @@
 //! Locating a frame: odometry, then refinement against the field.
-use super::{PoseEstimate, Slam, SlamError, TrackingStatus, VIEW_SLOT};
+use super::{
+    PoseEstimate, Slam, SlamError, TrackingStatus, points::sample_points, report::Tracked,
+};
 use crate::{
+    commands::Commands,
     config::Tracker,
     frame::Frame,
     kernels::{
         pose_step::POSE_BEST_LOSS,
         shared::{FLAG_GUIDED, FLAG_MASK, FLAG_POSE},
     },
-    keyframe::sample_points,
     map::{Batch, SemanticSupervision, passes, pose_from_words},
     pose::Pose,
-    recording::Recording,
     track::{
         gauss_newton::{self, Guard},
         odometry::RgbdPyramid,
@@ -18,70 +19,77 @@ use crate::{
 };
 
 impl Slam {
-    /// Adds the frame's pose to the trajectory. Second value: the odometer took the frame as a
-    /// reference, so the map should have it, too.
-    pub(super) async fn track(
-        &mut self,
-        frame: &Frame,
-    ) -> Result<(TrackingStatus, bool), SlamError> {
-        let push = |frames: &mut alloc::vec::Vec<PoseEstimate>, pose, status| {
-            frames.push(PoseEstimate {
-                frame: frame.index,
-                time_s: frame.time_s,
-                world_from_camera: pose,
-                status,
-            });
+    /// Adds the frame's pose to the trajectory.
+    pub(super) async fn track(&mut self, frame: &Frame) -> Result<Tracked, SlamError> {
+        let tracked = match self.config.tracking.tracker {
+            Tracker::Truth => self.take_truth(frame)?,
+            Tracker::Align | Tracker::Render => self.locate(frame).await?,
         };
+        self.frames.push(PoseEstimate {
+            frame: frame.index,
+            time_s: frame.time_s,
+            world_from_camera: tracked.world_from_camera,
+            status: tracked.status,
+        });
+        Ok(tracked)
+    }
+
+    /// `truth`: the frame brings its pose; without one it is lost.
+    fn take_truth(&self, frame: &Frame) -> Result<Tracked, SlamError> {
         let first = self.frames.is_empty();
-        if self.config.tracking.tracker == Tracker::Truth {
-            let status = match (first, frame.truth) {
-                (_, None) if first => {
-                    return Err(SlamError::Frame {
-                        frame: frame.index,
-                        field: "true pose",
-                        found: "none".into(),
-                        expected: "a pose, since the tracker is `truth`".into(),
-                    });
-                }
-                (_, None) => TrackingStatus::Lost,
-                (true, _) => TrackingStatus::First,
-                (false, _) => TrackingStatus::Tracked,
-            };
-            let last = self.frames.last().map_or(Pose::IDENTITY, |f| f.world_from_camera);
-            push(&mut self.frames, frame.truth.unwrap_or(last), status);
-            return Ok((status, first));
-        }
-        let config = self.odometer.config().pyramid;
+        let status = match frame.truth {
+            None if first => {
+                return Err(SlamError::Frame {
+                    frame: frame.index,
+                    field: "true pose",
+                    found: "none".into(),
+                    expected: "a pose, since the tracker is `truth`".into(),
+                });
+            }
+            None => TrackingStatus::Lost,
+            Some(_) if first => TrackingStatus::First,
+            Some(_) => TrackingStatus::Tracked,
+        };
+        let last = self.frames.last().map_or(Pose::IDENTITY, |f| f.world_from_camera);
+        let world_from_camera = frame.truth.unwrap_or(last);
+        Ok(Tracked { status, world_from_camera, is_reference: first })
+    }
+
+    /// Odometry against keyframes of its own, then refinement against the map.
+    async fn locate(&mut self, frame: &Frame) -> Result<Tracked, SlamError> {
+        let first = self.frames.is_empty();
+        let config = self.odometer.config().pyramid.clone();
         let pyramid = RgbdPyramid::new(frame, &self.info.camera, self.info.depth_unit_m, &config)?;
         let start = first.then(|| frame.truth.unwrap_or(Pose::IDENTITY));
         let found = self.odometer.track(pyramid, start)?;
         self.follow_registration(frame.index).await?;
-        let frame = &*self.registered(frame);
-        let mut pose = found.world_from_camera;
+        let start = found.world_from_camera;
+        let tracked = |status, world_from_camera, is_reference| Tracked {
+            status,
+            world_from_camera,
+            is_reference,
+        };
         if found.lost {
-            push(&mut self.frames, pose, TrackingStatus::Lost);
-            return Ok((TrackingStatus::Lost, false));
+            return Ok(tracked(TrackingStatus::Lost, start, false));
         }
         if first {
-            push(&mut self.frames, pose, TrackingStatus::First);
-            return Ok((TrackingStatus::First, true));
+            return Ok(tracked(TrackingStatus::First, start, true));
         }
+        let frame = &*self.registered(frame);
         let refined = match self.config.tracking.tracker {
-            Tracker::Align => self.align(frame, &pose, found.quality.information).await?,
-            Tracker::Render => self.render_track(frame, &pose).await?,
+            Tracker::Align => self.align(frame, &start, found.quality.information).await?,
+            Tracker::Render => self.render_track(frame, &start).await?,
             Tracker::Truth => None,
         };
         if let Some(refined) = refined {
-            pose = refined;
-            self.odometer.set_last_pose(pose);
+            self.odometer.set_last_pose(refined);
         }
-        push(&mut self.frames, pose, TrackingStatus::Tracked);
-        Ok((TrackingStatus::Tracked, found.keyframe.is_some()))
+        let pose = refined.unwrap_or(start);
+        Ok(tracked(TrackingStatus::Tracked, pose, found.keyframe.is_some()))
     }
 
     /// `align`: damped Gauss-Newton against the field, starting at the odometry's pose, which
-    /// weighs as much as its information says.
-    /// `None` when a guard refused the result.
+    /// weighs as much as its information says. `None` when a guard refused the result.
     async fn align(
         &mut self,
         frame: &Frame,
@@ -95,7 +103,7 @@ impl Slam {
         let (camera, unit, seed) = (self.info.camera, self.info.depth_unit_m, self.config.seed);
         let points = sample_points(frame, &camera, unit, t.align_pixels as usize, seed);
         let (engine, map, scratch) = self.mapped()?;
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         passes::upload_pixels(&mut r, scratch, &points);
         engine.submit(&r)?;
         let guard = Guard { offered: points.len(), ..Guard::default() };
@@ -122,7 +130,7 @@ impl Slam {
         let first_iteration = self.iteration;
         self.iteration += t.render_iterations + 1;
         let (engine, map, scratch) = self.mapped()?;
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         map.frames.upload_frame(&mut r, slot, frame);
         map.frames.upload_pose(&mut r, slot, start);
         scratch.upload_window(&mut r, &[(slot, false)]);
@@ -151,18 +159,5 @@ impl Slam {
         self.free_slots.push(slot);
         let pose = pose_from_words(&state[POSE_BEST_LOSS + 1..POSE_BEST_LOSS + 13]);
         Ok(pose.filter(|_| state[POSE_BEST_LOSS] < 1e30))
-    }
-
-    /// A slot for a frame's images, dropping the least useful keyframe when all are taken.
-    pub(super) fn take_slot(&mut self) -> Option<u32> {
-        if self.free_slots.is_empty() {
-            let i = crate::keyframe::least_useful(&self.keyframes)?;
-            let dropped = self.keyframes.remove(i);
-            self.free_slots.push(dropped.slot);
-        }
-        debug_assert!(!self.free_slots.contains(&VIEW_SLOT));
-        let slot = self.free_slots.pop()?;
-        self.used_slots = self.used_slots.max(slot + 1);
-        Some(slot)
     }
 }

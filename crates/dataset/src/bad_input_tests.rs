@@ -13,7 +13,7 @@ fn assert_has(text: &str, parts: &[&str]) {
     }
 }
 
-/// The error after a change of the tiny recording.
+/// Returns the error after a change of the tiny recording.
 fn after(change: impl FnOnce(&mut MemorySource)) -> String {
     let mut m = replica(3);
     change(&mut m);

@@ -24,7 +24,7 @@ impl ClassList {
     /// The lists that need no file, by name.
     pub const BUILT_IN: [&str; 2] = ["nyu40", "replica"];
 
-    /// A built-in list, `None` for any other name.
+    /// Returns a built-in list, `None` for any other name.
     pub fn built_in(name: &str) -> Option<ClassList> {
         match name {
             "nyu40" => Some(ClassList::nyu40()),
@@ -33,7 +33,7 @@ impl ClassList {
         }
     }
 
-    /// The 40 classes of NYU Depth v2 in ScanNet's label images (`label-filt` mapped to `nyu40id`)
+    /// Returns the 40 classes of NYU Depth v2 in ScanNet's label images (`label-filt` mapped to `nyu40id`)
     /// with ScanNet's colours; 0 is unlabelled.
     pub fn nyu40() -> ClassList {
         let class = |(i, (name, color)): (usize, &(&str, [u8; 3]))| Class {
@@ -56,7 +56,7 @@ impl ClassList {
         ClassList { name: "replica".into(), table, unlabelled: vec![0] }
     }
 
-    /// The list in `text`, the contents of `file`:
+    /// Parses the list in `text`, the contents of `file`:
     /// `{"7": {"name": "bed", "color": [86, 117, 191]}}`, colours optional. Classes
     /// named `void`, `unlabelled` or `unlabeled` are none, but ids that mean "no label".
     ///
@@ -113,7 +113,7 @@ impl ClassList {
         self.table.classes.retain(|c| c.raw_id != id);
     }
 
-    /// The ids that mean "no label".
+    /// Returns the ids that mean "no label".
     pub(super) fn unlabelled_ids(&self) -> Vec<u16> {
         let free = self.table.classes.iter().all(|c| c.raw_id != DEFAULT_UNLABELLED);
         match self.unlabelled.as_slice() {
@@ -123,7 +123,7 @@ impl ClassList {
     }
 }
 
-/// A colour for a class without one: hues a golden ratio apart, in three brightnesses.
+/// Returns a colour for a class without one: hues a golden ratio apart, in three brightnesses.
 pub fn class_color(id: u16) -> [u8; 3] {
     let hue = f64::from(id) * 0.618_033_988_749_895 % 1.0 * 6.0;
     let value = [240.0, 200.0, 160.0][usize::from(id % 3)];

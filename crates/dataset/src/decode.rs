@@ -91,7 +91,7 @@ pub(super) fn color(
     Ok(rgb.pixels().map(|p| p.0).collect())
 }
 
-/// Depth: the exact numbers of a 16-bit grey PNG.
+/// Decodes depth: the exact numbers of a 16-bit grey PNG.
 pub(super) fn depth(
     bytes: &[u8],
     origin: Origin<'_>,
@@ -104,7 +104,7 @@ pub(super) fn depth(
     Ok(raw.words())
 }
 
-/// Labels: the numbers of a grey or palette PNG of up to 16 bits. Palette entries are read as
+/// Decodes labels: the numbers of a grey or palette PNG of up to 16 bits. Palette entries are read as
 /// indices; their colours mean nothing here.
 pub(super) fn labels(bytes: &[u8], origin: Origin<'_>) -> Result<(Vec<u16>, Size), SequenceError> {
     let wanted = "a grey or palette PNG that holds class ids";
@@ -119,7 +119,7 @@ pub(super) fn labels(bytes: &[u8], origin: Origin<'_>) -> Result<(Vec<u16>, Size
     Ok((ids, raw.size))
 }
 
-/// The size of a PNG or JPEG, from its header.
+/// Returns the size of a PNG or JPEG, from its header.
 pub(super) fn size_of(bytes: &[u8], origin: Origin<'_>) -> Result<Size, SequenceError> {
     let readable = "a PNG or JPEG image";
     let reader = ImageReader::new(Cursor::new(bytes))
@@ -223,7 +223,7 @@ fn describe(bytes: &[u8]) -> String {
     }
 }
 
-/// Whether an end-of-image marker follows the first start of scan. (Within a scan, FF is always
+/// Returns whether an end-of-image marker follows the first start of scan. (Within a scan, FF is always
 /// followed by 00 or a restart marker.)
 fn jpeg_has_end(bytes: &[u8]) -> bool {
     let mut at = 2;

@@ -1,8 +1,7 @@
 //! What each layout boils down to: a list of frames with file names, and a camera.
 use super::{
     folder::{Folder, invalid, parse_matrix, plural},
-    intrinsics::{self, Intrinsics},
-    layout::{COLOR_ENDS, Layout, SEVEN_COLOR_ENDS},
+    intrinsics::Intrinsics,
     stored::Stored,
 };
 use glam::DVec3;
@@ -28,7 +27,7 @@ impl Entry {
     }
 }
 
-/// The depth image that belongs to a colour image, or an error that says how it would be called.
+/// Returns the depth image that belongs to a colour image, or an error that says how it would be called.
 pub(super) fn depth_of(
     depths: &BTreeMap<u64, String>,
     number: u64,
@@ -53,90 +52,33 @@ pub(super) struct Entries {
     pub warnings: Vec<String>,
 }
 
-/// Reads everything but the images.
-pub(super) fn read(
-    folder: &Folder,
-    layout: Layout,
-    given: Option<Intrinsics>,
-) -> Result<Entries, SequenceError> {
-    let mut entries = match layout {
-        Layout::ReplicaNice => replica(
-            folder,
-            folder.numbered("results/frame", &COLOR_ENDS)?,
-            folder.numbered("results/depth", &[".png"])?,
-            "results/depth",
-            1.0 / 6553.5,
-        )?,
-        Layout::ReplicaVmap => replica(
-            folder,
-            folder.numbered("rgb/rgb_", &COLOR_ENDS)?,
-            folder.numbered("depth/depth_", &[".png"])?,
-            "depth/depth_",
-            1e-3,
-        )?,
-        Layout::Tum => super::tum::read(folder)?,
-        Layout::SevenScenes => seven_scenes(folder)?,
-        Layout::ScanNet => super::scannet::read(folder)?,
-        Layout::Sens => super::sens::read(folder)?,
-        Layout::Nerfstudio => super::nerfstudio::read(folder)?,
-        Layout::Images => super::images::read(folder, given.clone())?,
-    };
-    if let Some(given) = given {
-        let depth_scale = entries.intrinsics.depth_scale;
-        entries.intrinsics = Intrinsics { depth_scale, ..given };
-    }
-    if let Some(scale) = entries.intrinsics.depth_scale {
-        entries.depth_unit_m = 1.0 / scale;
-    }
-    entries.bounds = bounds(folder)?;
-    let unposed = entries.frames.iter().filter(|e| e.truth.is_none()).count();
-    if unposed == entries.frames.len() {
-        entries.warnings.push("no ground-truth poses: the trajectory cannot be scored".into());
-    } else if unposed > 0 {
-        let frames = plural(unposed, "frame");
-        entries.warnings.push(format!("{frames} without a ground-truth pose: masked in scores"));
-    }
-    Ok(entries)
-}
-
-/// Both Replica renders.
-fn replica(
-    folder: &Folder,
-    colors: BTreeMap<u64, String>,
-    depths: BTreeMap<u64, String>,
-    depth_start: &str,
-    depth_unit_m: f64,
-) -> Result<Entries, SequenceError> {
-    let mut warnings = Vec::new();
-    let numbers: Vec<u64> = colors.keys().copied().collect();
-    let poses = ["traj.txt", "traj_w_c.txt"].into_iter().find(|f| folder.has(f));
-    let poses = match poses {
-        Some(file) => trajectory(folder, file, &numbers)?,
-        None => {
-            warnings.push("neither traj.txt nor traj_w_c.txt".into());
-            vec![None; numbers.len()]
+impl Entries {
+    /// Completes what a layout has read by what any recording may hold or be given beside it.
+    pub fn completed(
+        mut self,
+        folder: &Folder,
+        given: Option<Intrinsics>,
+    ) -> Result<Entries, SequenceError> {
+        if let Some(given) = given {
+            let depth_scale = self.intrinsics.depth_scale;
+            self.intrinsics = Intrinsics { depth_scale, ..given };
         }
-    };
-    let mut frames = Vec::with_capacity(numbers.len());
-    for ((number, color), truth) in colors.into_iter().zip(poses) {
-        let depth = depth_of(&depths, number, &color, depth_start)?;
-        frames.push(Entry::of_files(number, color, depth, truth));
+        if let Some(scale) = self.intrinsics.depth_scale {
+            self.depth_unit_m = 1.0 / scale;
+        }
+        self.bounds = bounds(folder)?;
+        let unposed = self.frames.iter().filter(|e| e.truth.is_none()).count();
+        if unposed == self.frames.len() {
+            self.warnings.push("no ground-truth poses: the trajectory cannot be scored".into());
+        } else if unposed > 0 {
+            let frames = plural(unposed, "frame");
+            self.warnings.push(format!("{frames} without a ground-truth pose: masked in scores"));
+        }
+        Ok(self)
     }
-    let surplus = depths.len() - frames.len();
-    if surplus > 0 {
-        warnings
-            .push(format!("{} without a colour image left out", plural(surplus, "depth image")));
-    }
-    let intrinsics = intrinsics::read(folder)?.unwrap_or_else(|| {
-        warnings.push("no cam_params.json: Replica's usual camera taken (1200x680, f 600)".into());
-        let from = "Replica (there is no cam_params.json)";
-        Intrinsics::fixed(from, (1200, 680), [600.0, 600.0, 599.5, 339.5])
-    });
-    let (invalid_depth, bounds) = (None, None);
-    Ok(Entries { frames, intrinsics, depth_unit_m, invalid_depth, bounds, warnings })
 }
 
-/// One pose a line. As many lines as images: line i belongs to the i-th image. More lines (when
+/// Reads one pose per line. As many lines as images: line i belongs to the i-th image. More lines (when
 /// only some of the images were kept): line n belongs to image number n.
 pub(super) fn trajectory(
     folder: &Folder,
@@ -162,39 +104,6 @@ pub(super) fn trajectory(
         .enumerate()
         .map(|(i, number)| parse_matrix(file, Some(*number), lines[line_of((i, number))]))
         .collect()
-}
-
-/// 7-Scenes: all files of a frame side by side.
-fn seven_scenes(folder: &Folder) -> Result<Entries, SequenceError> {
-    let mut warnings = Vec::new();
-    let colors = folder.numbered("frame-", &SEVEN_COLOR_ENDS)?;
-    let depths = folder.numbered("frame-", &[".depth.png"])?;
-    let poses = folder.numbered("frame-", &[".pose.txt"])?;
-    let mut frames = Vec::with_capacity(colors.len());
-    for (number, color) in colors {
-        let depth = depths.get(&number).cloned().ok_or_else(|| SequenceError::Read {
-            file: format!("frame-{number:06}.depth.png"),
-            reason: format!("missing: {color} has no depth image"),
-        })?;
-        let truth = match poses.get(&number) {
-            Some(file) => parse_matrix(file, Some(number), &folder.text(file)?)?,
-            None => None,
-        };
-        frames.push(Entry::of_files(number, color, depth, truth));
-    }
-    let intrinsics = intrinsics::read(folder)?.unwrap_or_else(|| {
-        warnings.push("no camera-intrinsics.txt: f 585, centre 320 240 taken".into());
-        let from = "7-Scenes (there is no camera-intrinsics.txt)";
-        Intrinsics::fixed(from, (640, 480), [585.0, 585.0, 320.0, 240.0])
-    });
-    Ok(Entries {
-        frames,
-        intrinsics,
-        depth_unit_m: 1e-3,
-        invalid_depth: Some(65535),
-        bounds: None,
-        warnings,
-    })
 }
 
 /// `bound.json`: {"bound": [[x0, x1], [y0, y1], [z0, z1]]}.

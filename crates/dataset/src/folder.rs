@@ -25,6 +25,9 @@ pub(super) fn invalid(
 /// More text than any recording has: a million poses of 16 numbers \[bytes\].
 const MAX_TEXT_BYTES: usize = 400 << 20;
 
+/// Endings of colour images.
+pub(super) const COLOR_ENDS: [&str; 3] = [".jpg", ".png", ".jpeg"];
+
 /// Files beside scenes that belong to all of them.
 const SHARED: [&str; 2] = ["cam_params.json", "scannetv2-labels.combined.tsv"];
 
@@ -63,7 +66,7 @@ impl Folder {
         true
     }
 
-    /// The folder's name for messages.
+    /// Returns the folder's name for messages.
     pub fn name(&self) -> String {
         match self.prefix.strip_suffix('/') {
             Some(inner) => format!("{}/{inner}", self.source.name()),
@@ -71,12 +74,12 @@ impl Folder {
         }
     }
 
-    /// Names of the files, sorted, relative to the recording's folder.
+    /// Returns the names of the files, sorted, relative to the recording's folder.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.names.iter().map(String::as_str)
     }
 
-    /// Whether there is such a file.
+    /// Returns whether there is such a file.
     pub fn has(&self, name: &str) -> bool {
         self.names.contains(name)
     }
@@ -103,7 +106,7 @@ impl Folder {
         None
     }
 
-    /// The name that the source knows a file by.
+    /// Returns the name that the source knows a file by.
     fn in_source(&self, name: &str) -> Result<String, SequenceError> {
         match name.strip_prefix('/') {
             Some(of_source) => Ok(of_source.into()),
@@ -115,12 +118,12 @@ impl Folder {
         }
     }
 
-    /// The bytes of a file.
+    /// Returns the bytes of a file.
     pub fn read(&self, name: &str) -> Result<Vec<u8>, SequenceError> {
         self.source.read(&self.in_source(name)?)
     }
 
-    /// The length of a file \[bytes\].
+    /// Returns the length of a file \[bytes\].
     pub fn size(&self, name: &str) -> Result<u64, SequenceError> {
         self.source.size(&self.in_source(name)?)
     }
@@ -135,7 +138,7 @@ impl Folder {
         self.source.read_range(&self.in_source(name)?, offset, bytes)
     }
 
-    /// A text file, without a byte order mark.
+    /// Reads a text file, without a byte order mark.
     pub fn text(&self, name: &str) -> Result<String, SequenceError> {
         let bytes = self.read(name)?;
         if bytes.len() > MAX_TEXT_BYTES {
@@ -152,13 +155,13 @@ impl Folder {
         })
     }
 
-    /// A JSON file.
+    /// Reads a JSON file.
     pub fn json(&self, name: &str) -> Result<serde_json::Value, SequenceError> {
         serde_json::from_str(&self.text(name)?)
             .map_err(|e| invalid(name, None, "JSON", e.to_string(), "a JSON document"))
     }
 
-    /// All files `START number END` for one of the ends, by number. Digits may or may not be
+    /// Returns all files `START number END` for one of the ends, by number. Digits may or may not be
     /// zero-padded; two files with one number are an error.
     pub fn numbered(
         &self,
@@ -192,13 +195,13 @@ impl Folder {
     }
 }
 
-/// The number in `START digits END`.
+/// Returns the number in `START digits END`.
 pub(super) fn number_between(name: &str, start: &str, end: &str) -> Option<u64> {
     let digits = name.strip_prefix(start)?.strip_suffix(end)?;
     digits.bytes().all(|b| b.is_ascii_digit()).then(|| digits.parse().ok()).flatten()
 }
 
-/// A pose as 16 row-major numbers. `Ok(None)` when any of them is not finite, which is how data
+/// Returns a pose as 16 row-major numbers. `Ok(None)` when any of them is not finite, which is how data
 /// sets say "no pose".
 pub(super) fn parse_matrix(
     file: &str,
@@ -224,7 +227,7 @@ pub(super) fn parse_matrix(
     }
 }
 
-/// All numbers of a text, separated by white space.
+/// Returns all numbers of a text, separated by white space.
 pub(super) fn parse_numbers(
     file: &str,
     frame: Option<u64>,
@@ -238,10 +241,27 @@ pub(super) fn parse_numbers(
         .collect()
 }
 
-/// A quoted word, cut to a length that fits a message.
+/// Returns a quoted word, cut to a length that fits a message.
 pub(super) fn shortened(word: &str) -> String {
     let short: String = word.chars().take(40).collect();
     format!("{short:?}{}", if short.len() < word.len() { "..." } else { "" })
+}
+
+/// Returns the last part of a path.
+pub(super) fn base(name: &str) -> &str {
+    name.rsplit('/').next().unwrap_or(name)
+}
+
+/// Returns all numbers in a name; digits beyond what a u64 holds are cut off.
+pub(super) fn numbers(name: &str) -> Vec<u64> {
+    let runs = name.split(|c: char| !c.is_ascii_digit()).filter(|r| !r.is_empty());
+    runs.map(|r| r.parse().unwrap_or(u64::MAX)).collect()
+}
+
+/// Returns the last number in a file's name.
+pub(super) fn last_number(name: &str) -> Option<u64> {
+    let stem = base(name);
+    numbers(stem.rsplit_once('.').map_or(stem, |(s, _)| s)).last().copied()
 }
 
 /// `n thing` or `n things`.

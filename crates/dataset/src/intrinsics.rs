@@ -29,7 +29,7 @@ pub(super) struct Intrinsics {
 const MAX_SHIFT_PIXELS: f64 = 1.0;
 
 impl Intrinsics {
-    /// A default without distortion, valid for one size.
+    /// Returns a default without distortion, valid for one size.
     pub fn fixed(from: &str, size: Size, focal_centre: [f64; 4]) -> Self {
         Self { size: Some(size), ..Self::any_size(from, focal_centre) }
     }
@@ -176,7 +176,7 @@ fn from_json(folder: &Folder, file: &str) -> Result<Intrinsics, SequenceError> {
     checked(shown, Intrinsics { size, distortion, depth_scale, ..camera })
 }
 
-/// A 3x3 or 4x4 matrix.
+/// Reads a 3x3 or 4x4 matrix.
 pub(super) fn from_matrix(folder: &Folder, file: &str) -> Result<Intrinsics, SequenceError> {
     let numbers = parse_numbers(file, None, &folder.text(file)?)?;
     let focal_centre = match *numbers.as_slice() {
@@ -277,7 +277,7 @@ impl Rectifier {
         Ok(Self { from: (raw.width, raw.height), camera, map })
     }
 
-    /// The camera of the result.
+    /// Returns the camera of the result.
     pub fn camera(&self) -> Camera {
         self.camera
     }

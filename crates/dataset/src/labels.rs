@@ -5,7 +5,7 @@ use super::{
     entries::Entry,
     folder::{Folder, invalid, number_between, plural},
     resize::{Resize, same_aspect},
-    scannet::{self, RawIds},
+    scannet_ids::{self, RawIds},
 };
 use mte_slam_types::{
     classes::{ClassTable, UNLABELLED},
@@ -22,7 +22,7 @@ const RAW_FOLDER: &str = "label-filt";
 const RAW_UNLABELLED: u16 = 0;
 /// In the look-up table: an id that is not in the class list.
 const UNKNOWN: u16 = 256;
-/// So many label images decide at opening whether the class list is theirs.
+/// This many label images decide at opening whether the class list is theirs.
 const CHECKED_IMAGES: usize = 8;
 
 /// The label images of a recording.
@@ -52,7 +52,7 @@ struct Met {
 }
 
 /// What the caller wants of the class list.
-pub(super) struct Wanted {
+pub(super) struct LabelOptions {
     pub list: Option<ClassList>,
     pub unlabelled: Option<u16>,
     pub only_present: bool,
@@ -66,7 +66,7 @@ impl Labels {
         mut own: Option<Folder>,
         frames: &mut [Entry],
         size: Size,
-        wanted: Wanted,
+        wanted: LabelOptions,
     ) -> Result<Option<Self>, SequenceError> {
         let mut is_raw = false;
         match &mut own {
@@ -96,7 +96,7 @@ impl Labels {
         }
         let images = own.as_ref().unwrap_or(recording);
         let raw = match is_raw {
-            true => scannet::raw_ids(images)?.or(scannet::raw_ids(recording)?),
+            true => scannet_ids::read(images)?.or(scannet_ids::read(recording)?),
             false => None,
         };
         let listed = match (wanted.list, &own) {
@@ -148,7 +148,7 @@ impl Labels {
         Ok(Some(Labels { own, table: ClassTable { classes }, raw, index, met }))
     }
 
-    /// The compact indices of one frame, in the size of its depth image.
+    /// Returns the compact indices of one frame, in the size of its depth image.
     pub fn read(
         &mut self,
         recording: &Folder,
@@ -213,7 +213,7 @@ impl Labels {
     }
 }
 
-/// The ids of a label image in `size`, and its own size.
+/// Returns the ids of a label image in `size`, and its own size.
 fn decode(
     folder: &Folder,
     file: &str,
@@ -273,7 +273,7 @@ fn check_list(
     Err(invalid(&list.name, None, "classes", found, "the list that belongs to the label images"))
 }
 
-/// All raw ids of all label images.
+/// Returns all raw ids of all label images.
 fn scan(
     folder: &Folder,
     frames: &[Entry],
@@ -338,7 +338,7 @@ fn assign(folder: &Folder, below: &str, frames: &mut [Entry]) -> Result<usize, S
     Ok(found)
 }
 
-/// A file's name without folder, extension and one trailing word: `a/frame-01.color.png` and
+/// Returns a file's name without folder, extension and one trailing word: `a/frame-01.color.png` and
 /// `frame-01.label.png` both give `frame-01`; a time stamp keeps its decimals.
 fn stem(name: &str) -> &str {
     let base = name.rsplit('/').next().unwrap_or(name);

@@ -6,6 +6,8 @@ use mte_slam_types::{
     sequence::{SequenceError, Source},
 };
 
+const TRANSFORMS: &str = "transforms.json";
+
 fn assert_has(text: &str, parts: &[&str]) {
     for part in parts {
         assert!(text.contains(part), "{part:?} is not in: {text}");
@@ -159,7 +161,7 @@ fn transforms_are_read_as_they_are_meant() {
     assert_has(&s.warnings().join(";"), &["another order"]);
     let changed = |from: &str, to: &str| {
         let mut m = m.clone();
-        replace(&mut m, nerfstudio::FILE, from, to);
+        replace(&mut m, TRANSFORMS, from, to);
         m
     };
     let error = |from: &str, to: &str| error_of(&changed(from, to), OpenOptions::default());
@@ -176,7 +178,7 @@ fn transforms_are_read_as_they_are_meant() {
     assert_has(&error("integer_depth_scale\":", "integer_depth_scale\":-"), &["metres per unit"]);
     // Depth of one frame is missing, and the pose of another.
     let mut m = changed("depth_file_path", "depth_file");
-    replace(&mut m, nerfstudio::FILE, "transform_matrix", "transform");
+    replace(&mut m, TRANSFORMS, "transform_matrix", "transform");
     let s = opened(&m).unwrap();
     assert_eq!(s.info().frames, 2);
     assert_has(&s.warnings().join(";"), &["1 frame without depth left out"]);

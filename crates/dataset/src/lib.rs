@@ -1,15 +1,9 @@
-//! Recordings on disk, in an archive or in a browser, by the layout of their files.
+#![doc = include_str!("../README.md")]
+//! # Layouts
 //!
-//! | layout | colour | depth | poses | labels |
-//! | --- | --- | --- | --- | --- |
-//! | `replica` | `results/frame000000.jpg` | `results/depth000000.png`, 1/6553.5 m | `traj.txt` | `semantic_class/` |
-//! | `replica-vmap` | `rgb/rgb_0.png` | `depth/depth_0.png`, mm | `traj.txt`, `traj_w_c.txt` | `semantic_class/` |
-//! | `tum` | `rgb.txt` | `depth.txt`, 1/5000 m | `groundtruth.txt` | `semantic_class/` |
-//! | `7scenes` | `frame-000000.color.png` | `frame-000000.depth.png`, mm | `frame-000000.pose.txt` | `semantic_class/` |
-//! | `scannet` | `color/0.jpg` | `depth/0.png`, mm | `pose/0.txt` | `label-filt/0.png` |
-//! | `sens` | in `NAME.sens` | there, in its unit | there | `label-filt/0.png` |
-//! | `nerfstudio` | `transforms.json` | there, mm unless it says | there (OpenGL axes) | `semantic_class/` |
-//! | `images` | `color/*`, `rgb/*`, `images/*` | `depth/*.png`, mm unless the camera says | `pose/0.txt`, `traj.txt`, `poses.txt` | `semantic_class/` |
+//! A recording is recognised by the layout of its files, on disk, in an archive or in a browser:
+//!
+#![doc = include_str!("layouts.md")]
 //!
 //! Files that any layout may hold beside its own:
 //! - the camera: `cam_params.json` (`{"camera": {w, h, fx, fy, cx, cy, scale}}`, `scale` in depth
@@ -38,25 +32,21 @@ mod features;
 mod folder;
 #[cfg(fuzzing)]
 pub mod fuzzing;
-mod images;
 pub mod inspect;
 mod intrinsics;
 mod labels;
-mod layout;
+mod layouts;
 mod memory;
-mod nerfstudio;
 mod reader;
 mod resize;
-mod scannet;
-mod sens;
+mod scannet_ids;
 mod stored;
-mod tum;
 mod write;
 mod zip;
 
 pub use class_list::{ClassList, class_color};
 pub use decode::{MAX_PIXELS, MAX_SIDE};
-pub use layout::Layout;
+pub use layouts::Layout;
 pub use memory::MemorySource;
 pub use reader::{Axes, GivenCamera, LabelSource, OpenOptions, open};
 pub use write::{ColorFormat, RecordingWriter, ReplicaWriter, SensWriter, TumWriter, WriteError};

@@ -10,27 +10,27 @@ pub struct MemorySource {
 }
 
 impl MemorySource {
-    /// An empty source with a name for messages.
+    /// Returns an empty source with a name for messages.
     pub fn new(name: impl Into<String>) -> Self {
         Self { name: name.into(), files: BTreeMap::new() }
     }
 
-    /// Add or replace a file; the name is `/`-separated.
+    /// Adds or replaces a file; the name is `/`-separated.
     pub fn insert(&mut self, file: impl Into<String>, bytes: impl Into<Vec<u8>>) {
         self.files.insert(file.into(), bytes.into());
     }
 
-    /// Take a file out.
+    /// Takes a file out.
     pub fn remove(&mut self, file: &str) -> Option<Vec<u8>> {
         self.files.remove(file)
     }
 
-    /// The bytes of a file.
+    /// Returns the bytes of a file.
     pub fn get(&self, file: &str) -> Option<&[u8]> {
         self.files.get(file).map(Vec::as_slice)
     }
 
-    /// The names, sorted.
+    /// Returns the names, sorted.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.files.keys().map(String::as_str)
     }

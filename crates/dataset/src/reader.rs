@@ -2,12 +2,12 @@
 use super::{
     class_list::ClassList,
     decode::Size,
-    entries::{self, Entry},
-    features::Features,
+    entries::Entry,
+    features::FeatureFiles,
     folder::{Folder, invalid, plural},
     intrinsics::{Intrinsics, Rectifier, checked},
-    labels::{Labels, Wanted},
-    layout::Layout,
+    labels::{LabelOptions, Labels},
+    layouts::Layout,
     resize::{Resize, same_aspect},
 };
 use mte_slam_types::{
@@ -22,6 +22,7 @@ const MIN_SIDE: u32 = 8;
 
 /// Where labels come from.
 #[derive(Default)]
+#[non_exhaustive]
 pub enum LabelSource {
     /// No labels.
     None,
@@ -57,7 +58,7 @@ impl GivenCamera {
         }
     }
 
-    /// All nine numbers, as [`GivenCamera::from_numbers`] takes them.
+    /// Returns all nine numbers, as [`GivenCamera::from_numbers`] takes them.
     pub fn numbers(&self) -> Vec<f64> {
         self.focal_centre.iter().chain(&self.distortion).copied().collect()
     }
@@ -100,9 +101,9 @@ pub struct OpenOptions {
     pub axes: Axes,
     /// First frame, counted from 0 in the recording's order.
     pub start: usize,
-    /// Every how manieth frame is used, at least 1.
+    /// One frame in this many is used; at least 1.
     pub stride: usize,
-    /// At most so many frames are used.
+    /// The most frames that are used.
     pub frames: Option<usize>,
     /// Images are made smaller by this factor, in (0, 1]: colour by averaging, depth and labels
     /// by nearest pixel.
@@ -176,7 +177,7 @@ pub fn open(
         }
     };
     let layout = Layout::detect(&mut folder, options.layout, given.is_some())?;
-    let mut all = entries::read(&folder, layout, given)?;
+    let mut all = layout.read(&folder, given)?;
     let mut warnings = std::mem::take(&mut all.warnings);
     if let Some(units) = options.depth_scale {
         all.depth_unit_m = 1.0 / units;
@@ -237,7 +238,7 @@ pub fn open(
     }
     camera = resize.camera(&camera);
 
-    let classes_wanted = Wanted {
+    let classes_wanted = LabelOptions {
         list: options.classes,
         unlabelled: options.unlabelled_raw_id,
         only_present: options.only_present_classes,
@@ -258,7 +259,7 @@ pub fn open(
     }
 
     let features = match options.features {
-        Some(source) => Some(Features::open(Folder::new(source)?, &frames)?),
+        Some(source) => Some(FeatureFiles::open(Folder::new(source)?, &frames)?),
         None => None,
     };
     if features.is_some() && rectifier.is_some() {
@@ -319,12 +320,12 @@ struct Reader {
     rectifier: Option<Rectifier>,
     resize: Resize,
     labels: Option<Labels>,
-    features: Option<Features>,
+    features: Option<FeatureFiles>,
     warnings: Vec<String>,
 }
 
 impl Reader {
-    /// Depth or labels, from the size on disk to the size of the camera.
+    /// Returns depth or labels, from the size on disk to the size of the camera.
     fn fit_nearest<T: Copy>(&self, mut image: Vec<T>) -> Vec<T> {
         if let Some(rectifier) = &self.rectifier {
             image = rectifier.nearest(&image);

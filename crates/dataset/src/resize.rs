@@ -5,7 +5,7 @@ use mte_slam_types::camera::Camera;
 /// Width over height of two images of one scene may differ by this share.
 pub(super) const ASPECT_TOLERANCE: f64 = 0.03;
 
-/// Whether one size is the other, enlarged, within a tolerance.
+/// Returns whether one size is the other, enlarged, within a tolerance.
 pub(super) fn same_aspect(a: Size, b: Size) -> bool {
     let aspect = |s: Size| f64::from(s.0) / f64::from(s.1);
     (aspect(a) / aspect(b) - 1.0).abs() <= ASPECT_TOLERANCE
@@ -20,7 +20,7 @@ struct Axis {
 }
 
 impl Axis {
-    /// The pixel at the centre of output pixel `i`; of two equally near ones the first, so that
+    /// Returns the pixel at the centre of output pixel `i`; of two equally near ones the first, so that
     /// an integer ratio `step` gives `step * i + (step - 1) / 2`.
     fn nearest(&self, i: u32) -> usize {
         let centre = (f64::from(i) + 0.5) * self.ratio - 0.5;
@@ -67,17 +67,17 @@ impl Resize {
         Self::to_size(from, (scaled(from.0), scaled(from.1)))
     }
 
-    /// Size of the result.
+    /// Returns the size of the result.
     pub fn size(&self) -> Size {
         (self.x.to, self.y.to)
     }
 
-    /// Whether nothing changes.
+    /// Returns whether nothing changes.
     pub fn is_identity(&self) -> bool {
         self.x.from == self.x.to && self.y.from == self.y.to
     }
 
-    /// The camera of the result; pixel centres lie at whole numbers, so a pixel coordinate u
+    /// Returns the camera of the result; pixel centres lie at whole numbers, so a pixel coordinate u
     /// becomes (u + 1/2) / ratio - 1/2.
     pub fn camera(&self, c: &Camera) -> Camera {
         Camera {

@@ -31,7 +31,7 @@ pub(super) enum Coding {
     Image,
     /// Red, green and blue of each pixel.
     RawColor,
-    /// A little-endian u16 a pixel.
+    /// A little-endian u16 per pixel.
     RawDepth,
     /// The same, compressed by zlib.
     ZlibDepth,
@@ -55,7 +55,7 @@ impl Stored {
         Origin { file: &self.file, frame, what }
     }
 
-    /// The size, from the header of the image.
+    /// Returns the size, from the header of the image.
     pub fn size(
         &self,
         folder: &Folder,
@@ -72,7 +72,7 @@ impl Stored {
         }
     }
 
-    /// Decode a colour image of a known size.
+    /// Decodes a colour image of a known size.
     pub fn color(
         &self,
         folder: &Folder,
@@ -90,7 +90,7 @@ impl Stored {
         }
     }
 
-    /// Decode a depth image of a known size.
+    /// Decodes a depth image of a known size.
     pub fn depth(
         &self,
         folder: &Folder,

@@ -44,7 +44,7 @@ pub fn frame(i: usize) -> Frame {
     }
 }
 
-/// Frames 0..n as files, colour as PNG.
+/// Returns frames 0..n as files, colour as PNG.
 pub fn replica(n: usize) -> MemorySource {
     let mut m = MemorySource::new("tiny");
     let sink = |name: &str, bytes: &[u8]| {
@@ -59,7 +59,7 @@ pub fn replica(n: usize) -> MemorySource {
     m
 }
 
-/// The same images under the names of another layout; with two-digit frame numbers not padded.
+/// Returns the same images under the names of another layout; with two-digit frame numbers not padded.
 pub fn renamed(n: usize, layout: Layout) -> MemorySource {
     if layout == Layout::Sens {
         return sens(n);
@@ -151,7 +151,7 @@ pub fn renamed(n: usize, layout: Layout) -> MemorySource {
     to
 }
 
-/// The same packed, with labels beside it.
+/// Returns the same packed, with labels beside it.
 pub fn sens(n: usize) -> MemorySource {
     let (mut m, mut packed) = (MemorySource::new("tiny"), Vec::new());
     let info = SequenceInfo { frames: n, ..info() };
@@ -173,7 +173,7 @@ pub fn opened(m: &MemorySource) -> Result<Box<dyn Sequence>, SequenceError> {
     open(Box::new(m.clone()), OpenOptions::default())
 }
 
-/// The error of opening or of reading the frames, as text.
+/// Returns the error of opening or of reading the frames, as text.
 pub fn error_of(m: &MemorySource, options: OpenOptions) -> String {
     let mut sequence = match open(Box::new(m.clone()), options) {
         Ok(sequence) => sequence,

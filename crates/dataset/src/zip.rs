@@ -67,7 +67,7 @@ struct Stream<R> {
 }
 
 impl<R: Read + Seek> ZipSource<R> {
-    /// An archive. `name` is for messages; "room.zip" holds the recording "room". Files that are
+    /// Opens an archive. `name` is for messages; "room.zip" holds the recording "room". Files that are
     /// read as a whole may have `max_file_bytes` bytes at most.
     ///
     /// # Errors
@@ -93,7 +93,7 @@ impl<R: Read + Seek> ZipSource<R> {
         Ok(Self { name: name.into(), names, max_file_bytes, reader, archive, stream })
     }
 
-    /// A decoder of a deflated file, standing at `offset` or before.
+    /// Returns a decoder of a deflated file, standing at `offset` or before.
     fn stream_to(&self, file: &str, offset: u64, (start, packed): (u64, u64)) -> Stream<R> {
         match self.stream.borrow_mut().take() {
             Some(open) if open.file == file && open.position <= offset => open,
@@ -106,7 +106,7 @@ impl<R: Read + Seek> ZipSource<R> {
     }
 }
 
-/// Whether a name stays below its folder.
+/// Returns whether a name stays below its folder.
 fn is_inside(name: &str) -> bool {
     !name.contains(['\\', '\0']) && name.split('/').all(|p| !matches!(p, "" | "." | ".."))
 }

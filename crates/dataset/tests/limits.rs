@@ -96,7 +96,7 @@ fn crc32(bytes: &[u8]) -> u32 {
     crc.sum()
 }
 
-/// A PNG of one IHDR, the chunks given, one IDAT.
+/// Returns a PNG of one IHDR, the chunks given, one IDAT.
 fn png(size: (u32, u32), bits: u8, color: u8, more: &[(&[u8; 4], &[u8])], data: &[u8]) -> Vec<u8> {
     let header =
         [&size.0.to_be_bytes()[..], &size.1.to_be_bytes(), &[bits, color, 0, 0, 0]].concat();
@@ -144,7 +144,7 @@ fn images() {
     }
     let _ = with(color, png((32, 24), 8, 2, &[], &bomb));
     let _ = with(depth, png((32, 24), 16, 0, &[], &bomb));
-    // The largest there may be, with the most bytes a pixel, is read: red, green, blue and alpha of
+    // The largest there may be, with the most bytes per pixel, is read: red, green, blue and alpha of
     // 16 bits, fitted to the depth image.
     let largest = png((9216, 6912), 16, 6, &[], &zlib_zeros(512 << 20));
     assert!(largest.len() < 1 << 20, "{}", largest.len());

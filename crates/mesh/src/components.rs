@@ -11,7 +11,7 @@ pub enum ComponentSize {
     Area(f64),
 }
 
-/// The connected parts, as lists of triangle indices, ordered by their first triangle. Triangles
+/// Returns the connected parts, as lists of triangle indices, ordered by their first triangle. Triangles
 /// are connected when they share a vertex.
 pub fn components(mesh: &Mesh) -> Vec<Vec<u32>> {
     let mut parent: Vec<u32> = (0..mesh.positions.len() as u32).collect();
@@ -45,7 +45,7 @@ pub fn components(mesh: &Mesh) -> Vec<Vec<u32>> {
 }
 
 impl Mesh {
-    /// Drop connected parts below a size. Returns how many were dropped.
+    /// Drops connected parts below a size. Returns how many were dropped.
     pub fn remove_small_components(&mut self, smaller_than: ComponentSize) -> usize {
         let mut keep = vec![false; self.triangles.len()];
         let mut dropped = 0;

@@ -9,7 +9,7 @@ use mte_slam_types::{camera::Camera, pose::Pose};
 
 /// One image that observed the scene.
 #[derive(Clone, Copy, Debug)]
-pub struct View<'a> {
+pub struct CullingView<'a> {
     /// The image's camera.
     pub camera: &'a Camera,
     /// The camera's pose in the frame of the mesh.
@@ -20,8 +20,8 @@ pub struct View<'a> {
     pub depth_unit_m: f64,
 }
 
-impl View<'_> {
-    /// Depth along z \[m\] of a world point and the index of the pixel that it falls on, if any.
+impl CullingView<'_> {
+    /// Returns depth along z \[m\] of a world point and the index of the pixel that it falls on, if any.
     fn pixel(&self, camera_from_world: &Pose, world: [f32; 3]) -> Option<(f64, usize)> {
         let p = camera_from_world.transform_point(to_dvec3(world));
         let uv = self.camera.project(p)?;
@@ -35,6 +35,7 @@ impl View<'_> {
 
 /// What counts as observed.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum CullProtocol {
     /// ESLAM's: a vertex falls on a pixel with sensor depth, no deeper than that depth plus the
     /// truncation \[m\] (0.06). Pixels without sensor depth observe nothing.
@@ -54,7 +55,7 @@ pub enum CullProtocol {
 }
 
 impl CullProtocol {
-    /// The name that figures culled in this way carry.
+    /// Returns the name that figures culled in this way carry.
     pub fn name(&self) -> &'static str {
         match self {
             CullProtocol::SensorDepth { .. } => "culled to frustum and sensor depth (ESLAM)",
@@ -74,7 +75,7 @@ fn between_centres(camera: &Camera, p: DVec3) -> Option<(f64, usize)> {
     inside.then(|| (p.z, (uv.y + 0.5) as usize * camera.width as usize + (uv.x + 0.5) as usize))
 }
 
-/// Whether each point is in the frustum of some pose.
+/// Returns whether each point is in the frustum of some pose.
 pub fn in_any_frustum(points: &[[f32; 3]], camera: &Camera, poses: &[Pose]) -> Vec<bool> {
     let cameras: Vec<Pose> = poses.iter().map(Pose::inverse).collect();
     parallel::map(points.len(), |i| {
@@ -110,14 +111,14 @@ impl Visibility {
         Visibility { in_view: unseen.clone(), unhidden: unseen }
     }
 
-    /// Add what one view sees. A view without depth is virtual: it observes nothing under
+    /// Adds what one view sees. A view without depth is virtual: it observes nothing under
     /// `SensorDepth`, and only helps visibility under `RenderedDepth`. Depth of a wrong size counts
     /// as missing where it has no pixel.
-    pub fn add_view(&mut self, mesh: &Mesh, view: &View<'_>, protocol: CullProtocol) {
+    pub fn add_view(&mut self, mesh: &Mesh, view: &CullingView<'_>, protocol: CullProtocol) {
         let camera_from_world = view.world_from_camera.inverse();
         let place = |i: usize| view.pixel(&camera_from_world, mesh.positions[i]);
         let n = mesh.positions.len();
-        // Two bits a vertex: in view, unhidden.
+        // Two bits per vertex: in view, unhidden.
         let seen: Vec<(bool, bool)> = match protocol {
             CullProtocol::SensorDepth { truncation_m } => parallel::map(n, |i| {
                 if self.in_view[i] {
@@ -147,7 +148,7 @@ impl Visibility {
         }
     }
 
-    /// Add what many views of one camera see under [`CullProtocol::RenderedDepth`], in parallel.
+    /// Adds what many views of one camera see under [`CullProtocol::RenderedDepth`], in parallel.
     /// `renderer` is that of `mesh`; `real` views count for `in_view`, virtual ones do not.
     pub fn add_rendered(
         &mut self,
@@ -194,7 +195,7 @@ impl Visibility {
     }
 }
 
-/// Keep the triangles of which enough corners are in view and enough are not hidden; drop unused
+/// Keeps the triangles of which enough corners are in view and enough are not hidden; drops unused
 /// vertices.
 pub fn cull(mesh: &mut Mesh, visibility: &Visibility, keep: Keep) {
     let triangles = core::mem::take(&mut mesh.triangles);
@@ -207,10 +208,10 @@ pub fn cull(mesh: &mut Mesh, visibility: &Visibility, keep: Keep) {
     mesh.drop_unused_vertices();
 }
 
-/// The part of a mesh that some views observed.
+/// Returns the part of a mesh that some views observed.
 pub fn observed_part<'a>(
     mesh: &Mesh,
-    views: impl IntoIterator<Item = View<'a>>,
+    views: impl IntoIterator<Item = CullingView<'a>>,
     protocol: CullProtocol,
     keep: Keep,
 ) -> Mesh {
@@ -242,8 +243,13 @@ mod tests {
         mesh
     }
 
-    fn view(depth: &[u16]) -> View<'_> {
-        View { camera: &CAMERA, world_from_camera: Pose::IDENTITY, depth, depth_unit_m: 1e-3 }
+    fn view(depth: &[u16]) -> CullingView<'_> {
+        CullingView {
+            camera: &CAMERA,
+            world_from_camera: Pose::IDENTITY,
+            depth,
+            depth_unit_m: 1e-3,
+        }
     }
 
     #[test]
@@ -303,8 +309,9 @@ mod tests {
         let depth = vec![1u16; 1600];
         let mut front = view(&depth);
         front.world_from_camera.translation = DVec3::new(0.0, 0.0, -3.0);
-        let part =
-            |views: &[View<'_>], p| observed_part(&cube, views.iter().copied(), p, Keep::AllSeen);
+        let part = |views: &[CullingView<'_>], p| {
+            observed_part(&cube, views.iter().copied(), p, Keep::AllSeen)
+        };
         // A vertex on the silhouette may fall on a pixel that shows nothing.
         let seen = part(&[front], protocol);
         assert!((0.8..=1.0 + 1e-6).contains(&seen.area()), "{}", seen.area());

@@ -22,7 +22,7 @@ pub struct DepthRenderer<'a> {
 }
 
 impl<'a> DepthRenderer<'a> {
-    /// Prepare a mesh whose vertex indices are in range ([`Mesh::check`]).
+    /// Prepares a mesh whose vertex indices are in range ([`Mesh::check`]).
     pub fn new(mesh: &'a Mesh) -> DepthRenderer<'a> {
         let around = |run: &[[u32; 3]]| {
             let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
@@ -34,7 +34,7 @@ impl<'a> DepthRenderer<'a> {
         DepthRenderer { mesh, boxes: mesh.triangles.chunks(RUN).map(around).collect() }
     }
 
-    /// Depth along z \[m\] at the pixels' centres, row-major; 0 where no surface is nearer than
+    /// Returns depth along z \[m\] at the pixels' centres, row-major; 0 where no surface is nearer than
     /// `far_m`.
     pub fn depth_m(&self, camera: &Camera, world_from_camera: &Pose, far_m: f64) -> Vec<f32> {
         let camera_from_world = world_from_camera.inverse();

@@ -2,7 +2,7 @@
 //!
 //! glTF is y-up by convention, while a world frame here has whatever "up" its data set has: the
 //! node keeps the identity and coordinates are those of the poses. Vertex colours are linear in
-//! glTF, so sRGB is converted, with 16 bits a channel to keep dark tones apart.
+//! glTF, so sRGB is converted, with 16 bits per channel to keep dark tones apart.
 use super::{Mesh, MeshError};
 use alloc::{
     collections::BTreeMap,
@@ -36,7 +36,7 @@ pub fn write_glb(mesh: &Mesh) -> Result<Vec<u8>, MeshError> {
     glb.finish()
 }
 
-/// The mesh with one primitive and one flat, named material a class. A triangle has the class of
+/// Returns the mesh with one primitive and one flat, named material per class. A triangle has the class of
 /// most of its vertices, else of its first.
 ///
 /// # Errors
@@ -70,7 +70,7 @@ pub fn write_glb_by_class(mesh: &Mesh, classes: &ClassTable) -> Result<Vec<u8>, 
     glb.finish()
 }
 
-/// The vertices that the corners of some triangles use, and the corners' indices among them.
+/// Returns the vertices that the corners of some triangles use, and the corners' indices among them.
 fn part_of(mesh: &Mesh, corners: &[u32]) -> (Mesh, Vec<u32>) {
     let mut part = Mesh::default();
     let mut place = BTreeMap::new();
@@ -97,7 +97,7 @@ fn linear(srgb: u8) -> f64 {
     if s <= 0.04045 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) }
 }
 
-/// A JSON string.
+/// Returns a JSON string.
 fn quoted(text: &str) -> String {
     let mut out = String::from("\"");
     for c in text.chars() {
@@ -165,7 +165,7 @@ impl Glb {
         Ok(())
     }
 
-    /// Append data (a multiple of 4 bytes), and describe it. Returns the accessor's index.
+    /// Appends data (a multiple of 4 bytes) and describes it. Returns the accessor's index.
     fn accessor(
         &mut self,
         data: &[u8],

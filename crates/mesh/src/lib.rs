@@ -1,5 +1,5 @@
-//! Triangle meshes: extraction from a signed distance in blocks, culling to what was observed,
-//! and the bytes of PLY and GLB files.
+#![doc = include_str!("../README.md")]
+//! # Conventions
 //!
 //! A mesh lives in the world frame of the poses it was made with \[m\]; triangles wind
 //! counter-clockwise seen from the free side (where the signed distance is positive).
@@ -17,7 +17,7 @@ mod raster;
 mod tables;
 
 pub use components::{ComponentSize, components};
-pub use cull::{CullProtocol, Keep, View, Visibility, cull, in_any_frustum, observed_part};
+pub use cull::{CullProtocol, CullingView, Keep, Visibility, cull, in_any_frustum, observed_part};
 pub use depth::DepthRenderer;
 pub use glb::{write_glb, write_glb_by_class};
 pub use marching::{Block, BlockMesher};
@@ -31,6 +31,7 @@ use mte_slam_types::pose::Pose;
 
 /// Why a mesh could not be made or written.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MeshError {
     /// Something has a size or value that cannot be worked with.
     #[error("{what}: found {found}, expected {expected}")]
@@ -52,7 +53,7 @@ pub enum MeshError {
     },
 }
 
-/// A triangle mesh. `normals`, `colors` and `classes` are each empty or one a vertex.
+/// A triangle mesh. `normals`, `colors` and `classes` are each empty or one per vertex.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// Vertex positions in the world frame \[m\].
@@ -68,7 +69,7 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// Whether indices are in range and attributes are empty or one a vertex.
+    /// Returns whether indices are in range and attributes are empty or one per vertex.
     pub fn check(&self) -> Result<(), MeshError> {
         let n = self.positions.len();
         let attributes = [
@@ -92,28 +93,28 @@ impl Mesh {
         }
     }
 
-    /// Position of vertex `i` in double precision \[m\].
+    /// Returns the position of vertex `i` in double precision \[m\].
     pub fn point(&self, i: u32) -> DVec3 {
         to_dvec3(self.positions[i as usize])
     }
 
-    /// The corners of triangle `t` \[m\].
+    /// Returns the corners of triangle `t` \[m\].
     pub fn corners(&self, t: usize) -> [DVec3; 3] {
         self.triangles[t].map(|i| self.point(i))
     }
 
-    /// Area of triangle `t` \[m2\].
+    /// Returns the area of triangle `t` \[m2\].
     pub fn triangle_area(&self, t: usize) -> f64 {
         let [a, b, c] = self.corners(t);
         (b - a).cross(c - a).length() * 0.5
     }
 
-    /// Total area \[m2\].
+    /// Returns the total area \[m2\].
     pub fn area(&self) -> f64 {
         (0..self.triangles.len()).map(|t| self.triangle_area(t)).sum()
     }
 
-    /// Set `normals` to the area-weighted mean of the adjacent triangles' normals.
+    /// Sets `normals` to the area-weighted mean of the adjacent triangles' normals.
     pub fn compute_normals(&mut self) {
         let mut sums = vec![DVec3::ZERO; self.positions.len()];
         for t in 0..self.triangles.len() {
@@ -127,7 +128,7 @@ impl Mesh {
         self.normals = sums.into_iter().map(unit).collect();
     }
 
-    /// Move the mesh by a rigid transform, for example to the frame of a ground-truth mesh.
+    /// Moves the mesh by a rigid transform, for example to the frame of a ground-truth mesh.
     pub fn transform(&mut self, to_from_mesh: &Pose) {
         for p in &mut self.positions {
             *p = to_from_mesh.transform_point(to_dvec3(*p)).to_array().map(|x| x as f32);
@@ -137,7 +138,7 @@ impl Mesh {
         }
     }
 
-    /// Keep the triangles for which `keep(index)` holds, and drop vertices that none of them
+    /// Keeps the triangles for which `keep(index)` holds, and drops vertices that none of them
     /// uses. The order of what stays does not change.
     pub fn retain_triangles(&mut self, keep: impl Fn(usize) -> bool) {
         let mut t = 0;
@@ -148,7 +149,7 @@ impl Mesh {
         self.drop_unused_vertices();
     }
 
-    /// Drop vertices that no triangle uses.
+    /// Drops vertices that no triangle uses.
     pub fn drop_unused_vertices(&mut self) {
         let mut new_index = vec![u32::MAX; self.positions.len()];
         for &i in self.triangles.iter().flatten() {
@@ -175,7 +176,7 @@ fn keep_used<T>(values: &mut Vec<T>, new_index: &[u32]) {
     });
 }
 
-/// A vertex or normal in f64.
+/// Converts a vertex or normal to f64.
 pub fn to_dvec3(p: [f32; 3]) -> DVec3 {
     DVec3::from_array(p.map(f64::from))
 }

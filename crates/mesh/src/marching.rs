@@ -31,7 +31,7 @@ pub struct Block {
 }
 
 impl Block {
-    /// Number of points.
+    /// Returns the number of points.
     pub fn points(&self) -> usize {
         self.dims.iter().map(|&d| d as usize).product()
     }
@@ -41,7 +41,7 @@ impl Block {
         self.grid_origin + DVec3::from_array(self.first.map(f64::from)) * self.grid_spacing_m
     }
 
-    /// Distance between neighbouring points \[m\].
+    /// Returns the distance between neighbouring points \[m\].
     pub fn spacing_m(&self) -> f64 {
         self.grid_spacing_m * f64::from(self.stride)
     }
@@ -57,7 +57,7 @@ impl Block {
         self.grid_origin + DVec3::from_array(at) * self.grid_spacing_m
     }
 
-    /// A coarser grid over the same box, with at most every `step`-th point, to find out cheaply
+    /// Returns a coarser grid over the same box, with at most every `step`-th point, to find out cheaply
     /// whether a surface can be inside. It may reach past the box by less than a coarse cell.
     pub fn probe(&self, step: u32) -> Block {
         let step = step.max(1);
@@ -65,7 +65,7 @@ impl Block {
         Block { dims, stride: self.stride * step, ..self.clone() }
     }
 
-    /// Whether a surface may be inside, from the signed distances \[m\] of this (coarse) grid's
+    /// Returns whether a surface may be inside, from the signed distances \[m\] of this (coarse) grid's
     /// points: some |distance| is below half a cell's diagonal plus `slack_m`, or the sign
     /// changes. True for a field whose gradient is at most 1; `slack_m` allows for a learned one.
     /// Unknown (non-finite) points count as surface unless all are unknown.
@@ -122,7 +122,7 @@ pub struct BlockMesher {
 }
 
 impl BlockMesher {
-    /// Mesh `bounds` with cells of `resolution_m`, 32^3 cells a block.
+    /// Meshes `bounds` with cells of `resolution_m`, 32^3 cells per block.
     ///
     /// # Errors
     /// Bounds or a resolution that are not finite and positive, more than 2^20 cells an axis.
@@ -130,7 +130,7 @@ impl BlockMesher {
         Self::with_block_cells(bounds, resolution_m, 32)
     }
 
-    /// As [`BlockMesher::new`] with `block_cells`^3 cells a block (1 to 256).
+    /// As [`BlockMesher::new`] with `block_cells`^3 cells per block (1 to 256).
     ///
     /// # Errors
     /// As [`BlockMesher::new`], or a block size out of range.
@@ -146,7 +146,7 @@ impl BlockMesher {
             return invalid("mesh resolution", format!("{resolution_m} m"), "more than 0 m");
         }
         if !(1..=256).contains(&block_cells) {
-            return invalid("cells a block", format!("{block_cells}"), "1 to 256");
+            return invalid("cells per block", format!("{block_cells}"), "1 to 256");
         }
         let size = bounds.max - bounds.min;
         if !(bounds.min.is_finite() && size.is_finite() && size.min_element() > 0.0) {
@@ -177,17 +177,17 @@ impl BlockMesher {
         })
     }
 
-    /// Number of blocks in all.
+    /// Returns the number of blocks in all.
     pub fn total_blocks(&self) -> u64 {
         self.blocks.iter().map(|&n| u64::from(n)).product()
     }
 
-    /// Number of blocks added or skipped so far.
+    /// Returns the number of blocks added or skipped so far.
     pub fn done_blocks(&self) -> u64 {
         self.done
     }
 
-    /// The next block, or `None` after the last. Several blocks may be out at once; they come
+    /// Returns the next block, or `None` after the last. Several blocks may be out at once; they come
     /// back in the order of issue.
     pub fn next_block(&mut self) -> Option<Block> {
         if self.issued >= self.total_blocks() {
@@ -211,7 +211,7 @@ impl BlockMesher {
         })
     }
 
-    /// Say that a block holds no surface.
+    /// Says that a block holds no surface.
     ///
     /// # Errors
     /// [`MeshError::BlockOrder`] when another block is due.
@@ -224,7 +224,7 @@ impl BlockMesher {
         Ok(())
     }
 
-    /// Mesh a block from the signed distances of its points \[m\], positive in free space, x
+    /// Meshes a block from the signed distances of its points \[m\], positive in free space, x
     /// fastest. A point with a non-finite distance is unknown: cells touching it get no triangles.
     ///
     /// # Errors
@@ -259,7 +259,7 @@ impl BlockMesher {
         Ok(())
     }
 
-    /// The mesh, with normals from its triangles and no colours or classes yet.
+    /// Returns the mesh, with normals from its triangles and no colours or classes yet.
     pub fn finish(mut self) -> Mesh {
         self.mesh.compute_normals();
         self.mesh
@@ -355,7 +355,7 @@ impl BlockMesher {
         }
     }
 
-    /// The vertex on edge `e` of the cell at local point `at` (local index `first`) with corner
+    /// Returns the vertex on edge `e` of the cell at local point `at` (local index `first`) with corner
     /// distances `s`: the one that exists already, or a new one.
     fn vertex(&mut self, block: &Block, at: [usize; 3], first: usize, e: u8, s: &[f32; 8]) -> u32 {
         let axis = (e / 4) as usize;
@@ -388,7 +388,7 @@ impl BlockMesher {
     }
 }
 
-/// Mesh a function of position, for tests and procedural scenes.
+/// Meshes a function of position, for tests and procedural scenes.
 #[cfg(test)]
 pub(crate) fn mesh_function(
     bounds: Bounds,

@@ -71,7 +71,7 @@ struct Element {
     properties: Vec<Property>,
 }
 
-/// Read a mesh. Understood: vertex x y z, nx ny nz, red green blue (uchar, or float in 0..1),
+/// Reads a mesh. Understood: vertex x y z, nx ny nz, red green blue (uchar, or float in 0..1),
 /// class or label; face vertex_indices or vertex_index, polygons cut into fans. Everything else
 /// is skipped. Memory stays in proportion to the bytes given, whatever the header claims.
 ///
@@ -254,7 +254,7 @@ impl Reader<'_> {
         text.parse().map_err(|_| bad)
     }
 
-    /// The length of a list. It may not exceed what is left: each value takes at least a byte.
+    /// Returns the length of a list. It may not exceed what is left: each value takes at least a byte.
     fn length(&mut self, scalar: Scalar) -> Result<usize, BadValue> {
         let n = self.value(scalar)?;
         let left = (self.bytes.len() - self.at.min(self.bytes.len())) as f64;

@@ -16,7 +16,7 @@ pub fn write_ply(mesh: &Mesh) -> Result<Vec<u8>, MeshError> {
     }))
 }
 
-/// The same with each vertex in its class's colour (black without one) and its raw id as `class`
+/// Returns the same with each vertex in its class's colour (black without one) and its raw id as `class`
 /// (ushort): `unlabelled` where it has none. Comments name the ids.
 ///
 /// # Errors
@@ -34,7 +34,7 @@ pub fn write_ply_by_class(
     let class = |i: usize| table.classes.get(usize::from(mesh.classes[i]));
     let mut comments = format!("comment class {unlabelled} (none)\n");
     for c in &table.classes {
-        // The header is ASCII, a line a comment.
+        // The header is ASCII, one line per comment.
         let name = c.name.chars().map(|c| if c.is_ascii_graphic() { c } else { ' ' });
         comments += &format!("comment class {} {}\n", c.raw_id, name.collect::<String>());
     }

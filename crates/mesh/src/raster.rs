@@ -54,7 +54,7 @@ fn to_image(camera: &Camera, p: DVec3) -> [f32; 3] {
     [u as f32, v as f32, inverse as f32]
 }
 
-/// Render a mesh, both sides of its triangles.
+/// Renders a mesh, both sides of its triangles.
 pub fn rasterise(mesh: &Mesh, camera: &Camera, world_from_camera: &Pose) -> Raster {
     let camera_from_world = world_from_camera.inverse();
     let vertices: Vec<Vertex> = parallel::map(mesh.positions.len(), |i| {
@@ -126,7 +126,7 @@ fn cut_at_near_plane(
         .for_each(out);
 }
 
-/// The box of pixel centres that a triangle may cover; `None` if there are none, as for most
+/// Returns the box of pixel centres that a triangle may cover; `None` if there are none, as for most
 /// triangles of a fine mesh.
 fn boxed(corners: [[f32; 3]; 3], triangle: u32, camera: &Camera) -> Option<Projected> {
     let [a, b, c] = &corners;
@@ -144,7 +144,7 @@ fn boxed(corners: [[f32; 3]; 3], triangle: u32, camera: &Camera) -> Option<Proje
     finite.then_some(Projected { corners, low, high, triangle })
 }
 
-/// Draw into rows `first_row..` of the image.
+/// Draws into rows `first_row..` of the image.
 pub(super) fn draw(p: &Projected, first_row: usize, width: usize, pixels: &mut [(f32, u32)]) {
     let end_row = first_row + pixels.len() / width;
     let rows = (p.low[1] as usize).max(first_row)..(p.high[1] as usize + 1).min(end_row);

@@ -11,7 +11,7 @@ pub(crate) const EDGE_BASE: [u8; 12] = [0, 2, 4, 6, 0, 1, 4, 5, 0, 1, 2, 3];
 const FACES: [[u8; 4]; 6] =
     [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
-/// The edge between two corners that differ in one bit.
+/// Returns the edge between two corners that differ in one bit.
 fn edge_between(a: u8, b: u8) -> usize {
     let (axis, base) = ((a ^ b).trailing_zeros() as usize, a & b);
     (axis * 4..axis * 4 + 4).find(|&e| EDGE_BASE[e] == base).unwrap_or(0)
@@ -61,7 +61,7 @@ fn triangles_of_case(case: u8) -> Vec<[u8; 3]> {
     triangles
 }
 
-/// Triangulate a polygon as the fan with the fewest diagonals inside a face of the cell: the
+/// Triangulates a polygon as the fan with the fewest diagonals inside a face of the cell: the
 /// neighbour might have the same diagonal, and the edge would then join four triangles.
 fn fan(polygon: &[u8], faces_of_edge: &[u8; 12], triangles: &mut Vec<[u8; 3]>) {
     let n = polygon.len();

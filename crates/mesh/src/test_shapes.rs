@@ -16,7 +16,7 @@ pub(crate) struct Topology {
     pub components: usize,
 }
 
-/// Count edges, and how they are shared.
+/// Counts edges, and how they are shared.
 pub(crate) fn topology(mesh: &Mesh) -> Topology {
     let mut edges: BTreeMap<(u32, u32), (u32, i32)> = BTreeMap::new();
     for t in &mesh.triangles {
@@ -35,12 +35,12 @@ pub(crate) fn topology(mesh: &Mesh) -> Topology {
     }
 }
 
-/// A cube about the origin.
+/// Returns a cube about the origin.
 pub(crate) fn cube_bounds(half_m: f64) -> Bounds {
     Bounds { min: DVec3::splat(-half_m), max: DVec3::splat(half_m) }
 }
 
-/// A flat square at height z, facing +z, `n` x `n` cells from (0, 0) to (size, size).
+/// Returns a flat square at height z, facing +z, `n` x `n` cells from (0, 0) to (size, size).
 pub(crate) fn square(n: u32, size: f32, z: f32) -> Mesh {
     let at = |i: u32| i as f32 / n as f32 * size;
     let mut positions: Vec<[f32; 3]> = vec![];

@@ -58,7 +58,7 @@ impl BoundaryMeter {
         BoundaryMeter { classes, of_class: vec![Counts::default(); classes] }
     }
 
-    /// Add an image of compact class indices, `width` pixels a row.
+    /// Adds an image of compact class indices, `width` pixels per row.
     ///
     /// # Errors
     /// Images of different size, or no whole number of rows.
@@ -114,7 +114,7 @@ impl BoundaryMeter {
         Ok(())
     }
 
-    /// The figures so far, `None` when nothing had an outline.
+    /// Returns the figures so far, `None` when nothing had an outline.
     pub fn report(&self) -> Option<BoundaryReport> {
         let percent = |part: f64, whole: f64| (whole > 0.0).then(|| 100.0 * part / whole);
         let iou = |c: &Counts| {
@@ -207,7 +207,7 @@ fn window(image: &[u8], width: usize, radius: usize, f: impl Fn(u8, u8) -> u8) -
     out
 }
 
-/// Whether `other` has an outline pixel of `class` in the disc around pixel `i`.
+/// Returns whether `other` has an outline pixel of `class` in the disc around pixel `i`.
 fn meets(i: usize, class: u8, other: &[u8], outline: &[bool], width: usize) -> bool {
     let r = BOUNDARY_PIXELS as i64;
     let (x, y) = ((i % width) as i64, (i / width) as i64);

@@ -8,9 +8,9 @@ const LEAF: usize = 8;
 
 /// What the hierarchy can hold.
 pub(crate) trait Shape: Copy + Send + Sync {
-    /// Smallest and largest corner of the enclosing box.
+    /// Returns the smallest and largest corner of the enclosing box.
     fn bounds(&self) -> ([f32; 3], [f32; 3]);
-    /// Square of the exact distance to a point.
+    /// Returns the square of the exact distance to a point.
     fn distance_squared(&self, p: DVec3) -> f64;
 }
 
@@ -71,21 +71,21 @@ impl Node {
 }
 
 /// Bounding volume hierarchy, split at the median of the longest axis.
-pub(crate) struct Bvh<S> {
+pub(crate) struct NearestBvh<S> {
     nodes: Vec<Node>,
     /// Shapes in the order of the leaves, and each one's index in the list given.
     shapes: Vec<S>,
     indices: Vec<u32>,
 }
 
-impl<S: Shape> Bvh<S> {
-    /// Build over shapes with finite coordinates (others are left out).
-    pub(crate) fn new(shapes: &[S]) -> Bvh<S> {
-        Bvh::of(shapes.to_vec())
+impl<S: Shape> NearestBvh<S> {
+    /// Builds over shapes with finite coordinates (others are left out).
+    pub(crate) fn new(shapes: &[S]) -> NearestBvh<S> {
+        NearestBvh::of(shapes.to_vec())
     }
 
-    /// As [`Bvh::new`], without a second copy of the shapes.
-    pub(crate) fn of(mut shapes: Vec<S>) -> Bvh<S> {
+    /// As [`NearestBvh::new`], without a second copy of the shapes.
+    pub(crate) fn of(mut shapes: Vec<S>) -> NearestBvh<S> {
         let centre = |s: &S| {
             let (low, high) = s.bounds();
             core::array::from_fn::<f32, 3, _>(|a| low[a] * 0.5 + high[a] * 0.5)
@@ -110,15 +110,15 @@ impl<S: Shape> Bvh<S> {
         } else {
             shapes = indices.iter().map(|&i| shapes[i as usize]).collect();
         }
-        Bvh { nodes, shapes, indices }
+        NearestBvh { nodes, shapes, indices }
     }
 
-    /// The shapes, neighbours next to each other.
+    /// Returns the shapes, neighbours next to each other.
     pub(crate) fn shapes(&self) -> &[S] {
         &self.shapes
     }
 
-    /// The nearest shape closer than `limit`: its index in the list given, and the square of its
+    /// Returns the nearest shape closer than `limit`: its index in the list given, and the square of its
     /// distance. Of equally near ones, any, but always the same.
     pub(crate) fn nearest(&self, p: DVec3, limit: f64) -> Option<(u32, f64)> {
         let mut best = (u32::MAX, limit * limit);
@@ -151,7 +151,7 @@ impl<S: Shape> Bvh<S> {
     }
 }
 
-/// Nodes that [`build`] makes of so many shapes. Halves differ by one shape at most, so each level
+/// Nodes that [`build`] makes of this many shapes. Halves differ by one shape at most, so each level
 /// has nodes of two sizes only.
 fn node_count(shapes: usize) -> usize {
     if shapes == 0 {
@@ -175,7 +175,7 @@ fn node_count(shapes: usize) -> usize {
     }
 }
 
-/// Put `shapes[order[i]]` at i, for all i at once.
+/// Puts `shapes[order[i]]` at i, for all i at once.
 fn permute<S: Copy>(shapes: &mut [S], order: &[u32]) {
     let mut done = vec![false; order.len()];
     for start in 0..order.len() {
@@ -230,7 +230,7 @@ fn build<S: Shape>(
     build(shapes, items, middle..range.end, nodes);
 }
 
-/// The triangles of a mesh as shapes.
+/// Returns the triangles of a mesh as shapes.
 pub(crate) fn triangles(mesh: &mte_slam_mesh::Mesh) -> Vec<[[f32; 3]; 3]> {
     let mut out = vec![];
     out.extend(mesh.triangles.iter().map(|t| t.map(|i| mesh.positions[i as usize])));
@@ -240,15 +240,15 @@ pub(crate) fn triangles(mesh: &mte_slam_mesh::Mesh) -> Vec<[[f32; 3]; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::Pcg;
+    use mte_slam_types::maths::Random;
 
-    fn point(rng: &mut Pcg) -> [f32; 3] {
+    fn point(rng: &mut Random) -> [f32; 3] {
         core::array::from_fn(|_| rng.uniform() as f32)
     }
 
     #[test]
     fn nearest_agrees_with_trying_all() {
-        let mut rng = Pcg::new(5, 0);
+        let mut rng = Random::new(5, 0);
         let points: Vec<[f32; 3]> = (0..999).map(|_| point(&mut rng)).collect();
         let mut triangles: Vec<[[f32; 3]; 3]> = (0..500)
             .map(|_| {
@@ -260,7 +260,7 @@ mod tests {
         triangles[7] = [points[0]; 3]; // degenerate ones
         triangles[8][2] = triangles[8][1];
         triangles[9][0][1] = f32::NAN;
-        let (by_point, by_triangle) = (Bvh::new(&points), Bvh::new(&triangles));
+        let (by_point, by_triangle) = (NearestBvh::new(&points), NearestBvh::new(&triangles));
         for _ in 0..300 {
             let p = to_dvec3(point(&mut rng)) * 1.5;
             let all = points.iter().map(|s| s.distance_squared(p)).fold(f64::MAX, f64::min);
@@ -271,15 +271,15 @@ mod tests {
             assert_eq!(by_triangle.nearest(p, 10.0).unwrap().1, all);
             assert!(by_triangle.nearest(p, all.sqrt() * 0.999).is_none());
         }
-        assert!(Bvh::<[f32; 3]>::new(&[]).nearest(DVec3::ZERO, 1.0).is_none());
+        assert!(NearestBvh::<[f32; 3]>::new(&[]).nearest(DVec3::ZERO, 1.0).is_none());
     }
 
     #[test]
     fn as_many_nodes_as_foretold_and_shapes_in_their_order() {
-        let mut rng = Pcg::new(7, 0);
+        let mut rng = Random::new(7, 0);
         for n in (0..300).chain([1000, 4097]) {
             let points: Vec<[f32; 3]> = (0..n).map(|_| point(&mut rng)).collect();
-            let bvh = Bvh::new(&points);
+            let bvh = NearestBvh::new(&points);
             assert_eq!(bvh.nodes.len(), node_count(n), "{n} shapes");
             for (shape, i) in bvh.shapes.iter().zip(&bvh.indices) {
                 assert_eq!(*shape, points[*i as usize]);
@@ -292,7 +292,7 @@ mod tests {
 
     #[test]
     fn triangle_distance_is_that_of_its_nearest_point() {
-        let mut rng = Pcg::new(6, 0);
+        let mut rng = Random::new(6, 0);
         for case in 0..300 {
             let mut t: [[f32; 3]; 3] = core::array::from_fn(|_| point(&mut rng));
             // Needles and points, too.

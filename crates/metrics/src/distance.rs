@@ -1,5 +1,5 @@
 //! Distances of points to a mesh, for pictures of errors.
-use super::bvh::{Bvh, triangles};
+use super::bvh::{NearestBvh, triangles};
 use alloc::vec::Vec;
 use mte_slam_mesh::{Mesh, to_dvec3};
 use mte_slam_types::parallel;
@@ -12,7 +12,7 @@ use num_traits::Float as _;
 /// # Panics
 /// An index of a triangle out of range: see [`Mesh::check`].
 pub fn distances_to_surface(points: &[[f32; 3]], mesh: &Mesh, limit_m: f64) -> Vec<f32> {
-    let tree = Bvh::new(&triangles(mesh));
+    let tree = NearestBvh::new(&triangles(mesh));
     parallel::map(points.len(), |i| {
         let nearest = tree.nearest(to_dvec3(points[i]), limit_m);
         nearest.map_or(limit_m, |(_, square)| square.sqrt()) as f32

@@ -44,7 +44,7 @@ fn same_size(what: &'static str, found: usize, expected: usize) -> Result<(), Me
 }
 
 impl PsnrMeter {
-    /// Add an image of 8-bit sRGB pixels; returns its PSNR \[dB\] over all pixels and channels.
+    /// Adds an image of 8-bit sRGB pixels; returns its PSNR \[dB\] over all pixels and channels.
     ///
     /// # Errors
     /// Images of different or zero size.
@@ -61,7 +61,7 @@ impl PsnrMeter {
         Ok(db)
     }
 
-    /// The figures so far, `None` without images.
+    /// Returns the figures so far, `None` without images.
     pub fn report(&self) -> Option<PsnrReport> {
         (self.images > 0).then(|| PsnrReport {
             protocol: "PSNR: 8-bit sRGB, peak 255, all pixels and channels".into(),
@@ -105,7 +105,7 @@ pub struct DepthMeter {
 }
 
 impl DepthMeter {
-    /// Add an image: rendered depth along z \[m\], and sensor depth in units of `unit_m`. Values
+    /// Adds an image: rendered depth along z \[m\], and sensor depth in units of `unit_m`. Values
     /// that are 0, negative or not finite are invalid. Returns the image's mean error \[m\] if
     /// any pixel has both.
     ///
@@ -140,7 +140,7 @@ impl DepthMeter {
         Ok(Some(sum / both as f64))
     }
 
-    /// The figures so far, `None` when no pixel had both depths.
+    /// Returns the figures so far, `None` when no pixel had both depths.
     pub fn report(&self) -> Option<DepthReport> {
         (self.both > 0).then(|| DepthReport {
             protocol: "Depth L1, views: rendered against sensor depth, pixels with both".into(),

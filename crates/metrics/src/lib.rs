@@ -1,5 +1,7 @@
-//! Evaluation: every figure of a run, each with the name of its protocol. Published tables mix
-//! protocols, so a figure without one means nothing.
+#![doc = include_str!("../README.md")]
+//! # Protocols
+//!
+//! Published tables mix protocols, so a figure without the name of its protocol means nothing.
 #![cfg_attr(not(feature = "std"), no_std)]
 extern crate alloc;
 
@@ -22,7 +24,8 @@ pub use surface::{
     SurfaceFigures, SurfaceOptions, SurfaceReport, evaluate_surface, icp, sample_surface,
 };
 pub use trajectory::{
-    Alignment, AteReport, ErrorSummary, PosePair, RpeReport, TrajectoryError, align_rigid, ate, rpe,
+    AteReport, ErrorSummary, PosePair, RigidAlignment, RpeReport, TrajectoryError, align_rigid,
+    ate, rpe,
 };
 pub use virtual_views::{
     DepthViews, MeshDepthReport, VIRTUAL_CAMERA, culling_views, depth_l1, depth_views,
@@ -30,6 +33,7 @@ pub use virtual_views::{
 
 /// Why images or meshes cannot be compared.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MetricsError {
     /// Two images of a comparison differ in size.
     #[error("{what}: found {found}, expected {expected}")]

@@ -68,7 +68,7 @@ impl SemanticMeter {
         SemanticMeter { confusion: ConfusionMatrix::new(classes), boundary }
     }
 
-    /// Add an image of compact class indices, `width` pixels a row; see [`ConfusionMatrix::add`].
+    /// Adds an image of compact class indices, `width` pixels per row; see [`ConfusionMatrix::add`].
     ///
     /// # Errors
     /// Images of different size, or no whole number of rows.
@@ -82,12 +82,12 @@ impl SemanticMeter {
         self.confusion.add(truth, predicted)
     }
 
-    /// The matrix so far.
+    /// Returns the matrix so far.
     pub fn confusion(&self) -> &ConfusionMatrix {
         &self.confusion
     }
 
-    /// The figures so far, `None` when no pixel had a true class.
+    /// Returns the figures so far, `None` when no pixel had a true class.
     pub fn report(&self) -> Option<SemanticReport> {
         let report = self.confusion.report()?;
         Some(SemanticReport { boundary: self.boundary.report(), ..report })
@@ -95,12 +95,12 @@ impl SemanticMeter {
 }
 
 impl ConfusionMatrix {
-    /// An empty matrix of compact classes 0..`classes`.
+    /// Returns an empty matrix of compact classes 0..`classes`.
     pub fn new(classes: usize) -> ConfusionMatrix {
         ConfusionMatrix { classes, counts: vec![0; classes * (classes + 1)], images: 0 }
     }
 
-    /// Add an image of compact class indices. Pixels whose truth is unlabelled (or no class of
+    /// Adds an image of compact class indices. Pixels whose truth is unlabelled (or no class of
     /// the table) are ignored; a prediction that is unlabelled (or no class) is wrong.
     ///
     /// # Errors
@@ -121,7 +121,7 @@ impl ConfusionMatrix {
         Ok(())
     }
 
-    /// Number of classes.
+    /// Returns the number of classes.
     pub fn classes(&self) -> usize {
         self.classes
     }
@@ -131,7 +131,7 @@ impl ConfusionMatrix {
         self.counts[truth * (self.classes + 1) + predicted]
     }
 
-    /// The figures so far, `None` when no pixel had a true class.
+    /// Returns the figures so far, `None` when no pixel had a true class.
     pub fn report(&self) -> Option<SemanticReport> {
         let n = self.classes;
         let pixels: u64 = self.counts.iter().sum();

@@ -1,52 +1,25 @@
 //! Accuracy and completion of a mesh against a true one, by samples of both surfaces.
 use super::{
     MetricsError,
-    bvh::{Bvh, Shape, triangles},
+    bvh::{NearestBvh, Shape, triangles},
     trajectory::align_rigid,
 };
 use alloc::{format, string::String, vec::Vec};
 use glam::DVec3;
 use mte_slam_mesh::{Mesh, to_dvec3};
-use mte_slam_types::parallel;
-use mte_slam_types::pose::Pose;
+use mte_slam_types::{
+    maths::{Random, pcg},
+    parallel,
+    pose::Pose,
+};
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 use serde::Serialize;
 
-/// Counter-based random numbers (PCG hash): the i-th number of a seed does not depend on order.
-pub(crate) struct Pcg {
-    key: u32,
-    counter: u32,
-}
-
-fn pcg(x: u32) -> u32 {
-    let state = x.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
-    word >> 22 ^ word
-}
-
-impl Pcg {
-    /// The sequence of a seed and a stream.
-    pub(crate) fn new(seed: u32, stream: u32) -> Pcg {
-        Pcg { key: pcg(seed.wrapping_add(pcg(stream))), counter: 0 }
-    }
-
-    fn next(&mut self) -> u32 {
-        self.counter = self.counter.wrapping_add(1);
-        pcg(pcg(self.counter) ^ self.key)
-    }
-
-    /// Uniform in \[0, 1) with 53 bits.
-    pub(crate) fn uniform(&mut self) -> f64 {
-        let bits = u64::from(self.next()) << 21 ^ u64::from(self.next()) >> 11;
-        bits as f64 / (1u64 << 53) as f64
-    }
-}
-
 /// How meshes are compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceOptions {
-    /// Samples a mesh.
+    /// Samples per mesh.
     pub samples: usize,
     /// Seed of the samples.
     pub seed: u32,
@@ -81,7 +54,7 @@ pub struct SurfaceFigures {
 pub struct SurfaceReport {
     /// What the figures mean; the caller adds how the meshes were culled and aligned.
     pub protocol: String,
-    /// Samples a mesh.
+    /// Samples per mesh.
     pub samples: usize,
     /// Seed of the samples.
     pub seed: u32,
@@ -125,7 +98,7 @@ pub fn sample_surface(
     }
     Ok(parallel::map(samples, |i| {
         // A stream of its own for each sample.
-        let mut rng = Pcg::new(seed, pcg(stream) ^ pcg(i as u32));
+        let mut rng = Random::new(seed, pcg(stream) ^ pcg(i as u32));
         let target = rng.uniform() * total;
         let t = cumulative.partition_point(|&c| c <= target).min(cumulative.len() - 1);
         let (root, along) = (rng.uniform().sqrt(), rng.uniform());
@@ -135,8 +108,8 @@ pub fn sample_surface(
     }))
 }
 
-/// Distance from each point to the nearest shape \[m\].
-fn distances<S: Shape>(points: &[[f32; 3]], to: &Bvh<S>) -> Vec<f64> {
+/// Returns the distance from each point to the nearest shape \[m\].
+fn distances<S: Shape>(points: &[[f32; 3]], to: &NearestBvh<S>) -> Vec<f64> {
     parallel::map(points.len(), |i| {
         to.nearest(to_dvec3(points[i]), f64::INFINITY).map_or(f64::NAN, |(_, d)| d.sqrt())
     })
@@ -160,7 +133,7 @@ fn figures(accuracy: &[f64], completion: &[f64], threshold_m: f64) -> SurfaceFig
     }
 }
 
-/// Compare two meshes in one frame, both already culled alike
+/// Compares two meshes in one frame, both already culled alike
 /// ([`mte_slam_mesh::observed_part`]).
 ///
 /// # Errors
@@ -178,7 +151,8 @@ pub fn evaluate_surface(
     let of_estimate = sample_surface(estimate, samples, seed, 0, "estimated")?;
     let of_truth = sample_surface(truth, samples, seed, 1, "true")?;
     let again = sample_surface(truth, samples, seed, 2, "true")?;
-    let (estimate_points, truth_points) = (Bvh::new(&of_estimate), Bvh::new(&of_truth));
+    let (estimate_points, truth_points) =
+        (NearestBvh::new(&of_estimate), NearestBvh::new(&of_truth));
     // Neighbouring queries visit the same nodes: points in the order of their own tree are twice
     // as fast to look up.
     let point_to_point = figures(
@@ -187,8 +161,8 @@ pub fn evaluate_surface(
         threshold_m,
     );
     let sampling_floor_cm = 100.0 * mean(&distances(&again, &truth_points));
-    let accuracy = distances(estimate_points.shapes(), &Bvh::of(triangles(truth)));
-    let completion = distances(truth_points.shapes(), &Bvh::of(triangles(estimate)));
+    let accuracy = distances(estimate_points.shapes(), &NearestBvh::of(triangles(truth)));
+    let completion = distances(truth_points.shapes(), &NearestBvh::of(triangles(estimate)));
     Ok(SurfaceReport {
         protocol: format!(
             "mesh: {samples} area-weighted samples a mesh, ratio under {} cm",
@@ -219,7 +193,7 @@ pub fn icp(
 ) -> Result<Pose, MetricsError> {
     let of_estimate = sample_surface(estimate, 20_000, seed, 3, "estimated")?;
     let of_truth = sample_surface(truth, 200_000, seed, 4, "true")?;
-    let target = Bvh::new(&of_truth);
+    let target = NearestBvh::new(&of_truth);
     let mut pose = Pose::IDENTITY;
     for _ in 0..50 {
         let pairs: Vec<Option<(DVec3, DVec3)>> = parallel::map(of_estimate.len(), |i| {

@@ -2,7 +2,7 @@
 use alloc::{vec, vec::Vec};
 use mte_slam_mesh::Mesh;
 
-/// A flat square at height z, facing +z, `n` x `n` cells from (0, 0) to (size, size).
+/// Returns a flat square at height z, facing +z, `n` x `n` cells from (0, 0) to (size, size).
 pub(crate) fn square(n: u32, size: f32, z: f32) -> Mesh {
     let at = |i: u32| i as f32 / n as f32 * size;
     let mut positions: Vec<[f32; 3]> = vec![];

@@ -2,13 +2,14 @@
 //! or have no finite truth are left out before.
 use alloc::{string::String, vec::Vec};
 use glam::{DMat3, DQuat, DVec3};
-use mte_slam_types::pose::Pose;
+use mte_slam_types::{maths::eigen_symmetric, pose::Pose};
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 use serde::Serialize;
 
 /// Why a trajectory error cannot be said.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TrajectoryError {
     /// Too few pairs for the figure.
     #[error("{what}: found {found} pairs of poses, expected at least {expected}")]
@@ -104,19 +105,19 @@ pub struct RpeReport {
 
 /// A least-squares rigid alignment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Alignment {
+pub struct RigidAlignment {
     /// Maps source points onto target points.
     pub target_from_source: Pose,
     /// Whether the rotation is the only best one.
     pub unique: bool,
 }
 
-/// The rigid transform (no scale) that maps `source` points onto `target` points with the least
+/// Returns the rigid transform (no scale) that maps `source` points onto `target` points with the least
 /// sum of squared distances: Horn's quaternion method, which equals Umeyama's without scale.
 ///
 /// # Errors
 /// [`TrajectoryError::TooFew`] under 3 points (lists are cut to the shorter).
-pub fn align_rigid(source: &[DVec3], target: &[DVec3]) -> Result<Alignment, TrajectoryError> {
+pub fn align_rigid(source: &[DVec3], target: &[DVec3]) -> Result<RigidAlignment, TrajectoryError> {
     let n = source.len().min(target.len());
     if n < 3 {
         return Err(TrajectoryError::TooFew { what: "rigid alignment", found: n, expected: 3 });
@@ -135,62 +136,21 @@ pub fn align_rigid(source: &[DVec3], target: &[DVec3]) -> Result<Alignment, Traj
         }
     }
     let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = s;
-    let mut m = [
+    let m = [
         [xx + yy + zz, yz - zy, zx - xz, xy - yx],
         [yz - zy, xx - yy - zz, xy + yx, zx + xz],
         [zx - xz, xy + yx, yy - xx - zz, yz + zy],
         [xy - yx, zx + xz, yz + zy, zz - xx - yy],
     ];
-    let vectors = jacobi_eigen(&mut m);
-    let mut order = [0, 1, 2, 3];
-    order.sort_by(|&a, &b| m[b][b].total_cmp(&m[a][a]));
-    let best = order[0];
-    let [w, x, y, z] = [0, 1, 2, 3].map(|row| vectors[row][best]);
+    let (values, vectors) = eigen_symmetric(&m);
+    let [w, x, y, z] = vectors[3];
     let rotation = DMat3::from_quat(DQuat::from_xyzw(x, y, z, w).normalize());
     let translation = target_mean - rotation * source_mean;
-    let gap = m[best][best] - m[order[1]][order[1]];
-    Ok(Alignment {
+    let gap = values[3] - values[2];
+    Ok(RigidAlignment {
         target_from_source: Pose { rotation, translation },
         unique: gap > 1e-9 * scale && scale > 0.0,
     })
-}
-
-/// Diagonalise a symmetric matrix in place by Jacobi rotations; returns the eigenvectors as
-/// columns.
-fn jacobi_eigen(m: &mut [[f64; 4]; 4]) -> [[f64; 4]; 4] {
-    let mut v = [[0f64; 4]; 4];
-    (0..4).for_each(|i| v[i][i] = 1.0);
-    // Convergence is quadratic: some 6 sweeps reach rounding error.
-    for _ in 0..30 {
-        let norm: f64 = m.iter().flatten().map(|x| x * x).sum();
-        let off: f64 =
-            (0..4).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| m[i][j] * m[i][j]).sum();
-        if off <= 1e-32 * norm {
-            break;
-        }
-        for p in 0..3 {
-            for q in p + 1..4 {
-                if m[p][q] == 0.0 {
-                    continue;
-                }
-                let theta = (m[q][q] - m[p][p]) / (2.0 * m[p][q]);
-                let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
-                let c = 1.0 / (t * t + 1.0).sqrt();
-                let s = t * c;
-                for k in 0..4 {
-                    let (a, b) = (m[k][p], m[k][q]);
-                    (m[k][p], m[k][q]) = (c * a - s * b, s * a + c * b);
-                    let (a, b) = (v[k][p], v[k][q]);
-                    (v[k][p], v[k][q]) = (c * a - s * b, s * a + c * b);
-                }
-                for k in 0..4 {
-                    let (a, b) = (m[p][k], m[q][k]);
-                    (m[p][k], m[q][k]) = (c * a - s * b, s * a + c * b);
-                }
-            }
-        }
-    }
-    v
 }
 
 fn check_finite(pairs: &[PosePair]) -> Result<(), TrajectoryError> {
@@ -257,11 +217,11 @@ pub fn rpe(pairs: &[PosePair], delta: usize) -> Result<RpeReport, TrajectoryErro
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::Pcg;
+    use mte_slam_types::maths::Random;
 
-    /// A smooth random path, and estimates with noise after a rigid motion of the world.
+    /// Returns a smooth random path, and estimates with noise after a rigid motion of the world.
     fn random_pairs(seed: u32, n: usize, noise_m: f64, world: &Pose) -> Vec<PosePair> {
-        let mut rng = Pcg::new(seed, 0);
+        let mut rng = Random::new(seed, 0);
         let mut random = |size: f64| (rng.uniform() * 2.0 - 1.0) * size;
         let mut truth = Pose::IDENTITY;
         (0..n)

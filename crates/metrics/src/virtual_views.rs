@@ -1,14 +1,10 @@
 //! Views that no camera took: those that help Co-SLAM's culling, and depth L1 by virtual views of
 //! two meshes. All are drawn from a seed, so that everybody can draw the same.
-use super::{
-    MetricsError,
-    surface::{Pcg, sample_surface},
-};
+use super::{MetricsError, surface::sample_surface};
 use alloc::{format, string::String, vec::Vec};
 use glam::{DMat3, DVec2, DVec3};
 use mte_slam_mesh::{DepthRenderer, Mesh, in_any_frustum};
-use mte_slam_types::parallel;
-use mte_slam_types::{camera::Camera, pose::Pose};
+use mte_slam_types::{camera::Camera, maths::Random, parallel, pose::Pose};
 use serde::Serialize;
 
 /// The camera of depth L1 by virtual views.
@@ -33,7 +29,7 @@ const STREAM_UNSEEN: u32 = 5;
 const STREAM_DEPTH_VIEWS: u32 = 6;
 const STREAM_CULLING_VIEWS: u32 = 7;
 
-/// A camera at `eye` that looks along `forward`, `up` being up in its image; `None` when they are
+/// Returns a camera at `eye` that looks along `forward`, `up` being up in its image; `None` when they are
 /// parallel.
 fn look(eye: DVec3, forward: DVec3, up: DVec3) -> Option<Pose> {
     let z = forward.try_normalize()?;
@@ -41,8 +37,8 @@ fn look(eye: DVec3, forward: DVec3, up: DVec3) -> Option<Pose> {
     Some(Pose { rotation: DMat3::from_cols(x, z.cross(x), z), translation: eye })
 }
 
-/// A direction, uniform in a cube about the origin (the peers look at points of one of 20 km).
-fn direction(rng: &mut Pcg) -> DVec3 {
+/// Returns a direction, uniform in a cube about the origin (the peers look at points of one of 20 km).
+fn direction(rng: &mut Random) -> DVec3 {
     DVec3::from_array(core::array::from_fn(|_| 2.0 * rng.uniform() - 1.0))
 }
 
@@ -61,7 +57,7 @@ pub fn culling_views(
         return Vec::new();
     }
     let found: Vec<Option<Pose>> = parallel::map(views, |i| {
-        let mut rng = Pcg::new(seed, STREAM_CULLING_VIEWS ^ ((i as u32) << 8));
+        let mut rng = Random::new(seed, STREAM_CULLING_VIEWS ^ ((i as u32) << 8));
         // Some pixels show no surface, as through a window.
         (0..8).find_map(|_| {
             let pick = |n: usize, u: f64| ((n as f64 * u) as usize).min(n - 1);
@@ -95,7 +91,7 @@ pub struct DepthViews {
     pub seed: u32,
 }
 
-/// Draw views for depth L1 as NICE-SLAM does: from inside the box of the culled true mesh (the
+/// Draws views for depth L1 as NICE-SLAM does: from inside the box of the culled true mesh (the
 /// smallest upright one; its shortest side times 0.3, the others times 0.7, moved up by 0.4 m; z
 /// is up), in random directions, without those that have a point in view that no frame had
 /// (`whole` is the true mesh before culling, sampled for that). At most 500 poses are tried for
@@ -125,7 +121,7 @@ pub fn depth_views(
         // In batches, so that threads have something to do.
         let batch = (tries - tried).min(1024);
         let found = parallel::map(batch, |i| {
-            let mut rng = Pcg::new(seed, STREAM_DEPTH_VIEWS ^ (((tried + i) as u32) << 8));
+            let mut rng = Random::new(seed, STREAM_DEPTH_VIEWS ^ (((tried + i) as u32) << 8));
             let at = core::array::from_fn(|_| rng.uniform() - 0.5);
             let eye = room.point(at) + DVec3::Z * BOX_LIFT_M;
             let pose = look(eye, direction(&mut rng), DVec3::Z)?;
@@ -205,7 +201,7 @@ impl ViewSums {
     }
 }
 
-/// Compare the depth of two meshes, both culled alike, in virtual views.
+/// Compares the depth of two meshes, both culled alike, in virtual views.
 ///
 /// # Errors
 /// [`MetricsError::NoSurface`] for a broken mesh; [`MetricsError::NoViews`] when no view counts.
@@ -262,7 +258,7 @@ struct UprightBox {
 }
 
 impl UprightBox {
-    /// The smallest such box around points, by the least area seen from above; `None` without
+    /// Returns the smallest such box around points, by the least area seen from above; `None` without
     /// finite points.
     fn around(points: &[[f32; 3]]) -> Option<UprightBox> {
         let finite = || points.iter().filter(|p| p.iter().all(|x| x.is_finite()));
@@ -305,13 +301,13 @@ impl UprightBox {
         self
     }
 
-    /// The point at `at`, each from -0.5 to 0.5.
+    /// Returns the point at `at`, each from -0.5 to 0.5.
     fn point(&self, at: [f64; 3]) -> DVec3 {
         (0..3).fold(self.centre, |p, a| p + self.axes[a] * (self.sides[a] * at[a]))
     }
 }
 
-/// Corners of the convex hull, counter-clockwise.
+/// Returns the corners of the convex hull, counter-clockwise.
 fn convex_hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     points.dedup();
@@ -349,7 +345,7 @@ mod tests {
     use crate::test_shapes::square;
     use alloc::vec;
 
-    /// The inside of a room of 6 x 4 x 3 m centred on the origin but for z, turned about z.
+    /// Returns the inside of a room of 6 x 4 x 3 m centred on the origin but for z, turned about z.
     fn room(turn: f64) -> Mesh {
         let size = [6.0f32, 4.0, 3.0];
         let mut mesh = Mesh::default();
@@ -369,7 +365,7 @@ mod tests {
         mesh
     }
 
-    /// A camera in the middle of the room that looks level at `degrees` from x.
+    /// Returns a camera in the middle of the room that looks level at `degrees` from x.
     fn level(degrees: f64) -> Pose {
         let a = degrees.to_radians();
         let eye = DVec3::new(0.5, -0.3, 1.5);

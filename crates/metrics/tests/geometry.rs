@@ -186,7 +186,7 @@ fn projection_and_back_projection_are_inverse() {
     }
 }
 
-/// Depth of the nearest triangle along a pixel's ray, by Möller and Trumbore's test of each one, and
+/// Returns depth of the nearest triangle along a pixel's ray, by Möller and Trumbore's test of each one, and
 /// by how much (in barycentric coordinates) the nearest decision was taken.
 fn cast(mesh: &Mesh, camera: &Camera, pose: &Pose, u: usize, v: usize) -> (f64, f64) {
     let d = pose.transform_vector(camera.back_project(u as f64, v as f64, 1.0));
@@ -252,7 +252,7 @@ fn rendered_depth_is_that_of_rays_cast_at_every_triangle() {
     assert!(compared > 25_000 && surfaces > 4_000, "{surfaces} of {compared}");
 }
 
-/// A smooth random field, positive at the border of the box.
+/// Returns a smooth random field, positive at the border of the box.
 fn field(g: &mut Lcg) -> impl Fn(DVec3) -> f64 + use<> {
     let waves: Vec<(DVec3, f64, f64)> =
         (0..6).map(|_| (g.point(6.0), g.unit() * 6.3, 0.1 + 0.2 * g.unit())).collect();
@@ -302,7 +302,7 @@ fn meshes_of_random_smooth_fields_are_watertight() {
     }
 }
 
-/// A wavy closed surface about the origin.
+/// Returns a wavy closed surface about the origin.
 fn blob(seed: u64) -> Mesh {
     let bounds = Bounds { min: DVec3::splat(-1.0), max: DVec3::splat(1.0) };
     let f = field(&mut Lcg(seed));

@@ -10,6 +10,7 @@ use mte_slam_odometry::{Odometer, OdometryConfig, RgbdPyramid};
 use mte_slam_types::{
     pose::Pose,
     sequence::{Sequence, SequenceError, Source},
+    settings,
 };
 use std::{
     error::Error,
@@ -80,7 +81,6 @@ struct Options {
 }
 
 fn options(args: impl Iterator<Item = String>) -> Result<Options, Box<dyn Error>> {
-    let mut config = serde_json::to_value(OdometryConfig::default())?;
     let mut options = Options {
         only: String::new(),
         frames: None,
@@ -98,19 +98,14 @@ fn options(args: impl Iterator<Item = String>) -> Result<Options, Box<dyn Error>
             "verbose" => options.verbose = value == "1",
             "out" => options.out = Some(PathBuf::from(value)),
             _ => {
-                let mut at = &mut config;
-                for part in key.split('.') {
-                    at = at.get_mut(part).ok_or_else(|| format!("no setting {key}"))?;
-                }
-                *at = serde_json::from_str(value)?;
+                settings::set(&mut options.odometry, key, serde_json::from_str(value)?)?;
             }
         }
     }
-    options.odometry = serde_json::from_value(config)?;
     Ok(options)
 }
 
-/// Track one recording and print its line of the table.
+/// Tracks one recording and prints its line of the table.
 fn measure(name: &str, mut sequence: Box<dyn Sequence>, o: &Options) -> Result<(), Box<dyn Error>> {
     let info = sequence.info().clone();
     let mut odometer = Odometer::new(o.odometry.clone());
@@ -154,7 +149,7 @@ fn measure(name: &str, mut sequence: Box<dyn Sequence>, o: &Options) -> Result<(
     }
     let last: Vec<Pose> = odometer.trajectory().iter().map(|t| t.1).collect();
     if let Some(out) = &o.out {
-        // A line a frame: estimate, then truth, both `world_from_camera`, 3x4 row by row.
+        // One line per frame: estimate, then truth, both `world_from_camera`, 3x4 row by row.
         let mut text = String::new();
         for (i, estimate) in last.iter().enumerate() {
             let Some(truth) = sequence.truth(i) else { continue };
@@ -166,7 +161,7 @@ fn measure(name: &str, mut sequence: Box<dyn Sequence>, o: &Options) -> Result<(
         fs::write(out.join(format!("{name}.txt")), text)?;
     }
     if o.verbose {
-        println!("colour registration {:?}", odometer.colour_registration());
+        println!("colour registration {:?}", odometer.color_registration());
     }
     let error = |poses: &[Pose]| {
         let pairs: Vec<PosePair> = (poses.iter().enumerate())
@@ -185,7 +180,7 @@ fn measure(name: &str, mut sequence: Box<dyn Sequence>, o: &Options) -> Result<(
         per_frame * seconds,
         per_frame * prepare,
         odometer.keyframes().len(),
-        odometer.colour_registration().scale,
+        odometer.color_registration().scale,
     );
     Ok(())
 }

@@ -56,7 +56,7 @@ pub struct Alignment {
 }
 
 impl Alignment {
-    /// Smallest over largest eigenvalue, 0 for no information at all.
+    /// Returns the smallest over largest eigenvalue, 0 for no information at all.
     pub fn conditioning(&self) -> f64 {
         if self.eigenvalues[5] > 0.0 {
             (self.eigenvalues[0] / self.eigenvalues[5]).max(0.0)
@@ -66,7 +66,7 @@ impl Alignment {
     }
 }
 
-/// Align `current` to one reference, starting from `initial` (`reference_from_current`).
+/// Aligns `current` to one reference, starting from `initial` (`reference_from_current`).
 ///
 /// # Errors
 /// [`OdometryError::NoDepth`] where either frame has next to no depth, [`OdometryError::BadPose`].
@@ -81,7 +81,7 @@ pub fn align(
     align_many(&[reference], current, initial, config)
 }
 
-/// Align `current` to all `references` at once: one pose (`world_from_camera`), the sum of their
+/// Aligns `current` to all `references` at once: one pose (`world_from_camera`), the sum of their
 /// normal equations.
 ///
 /// # Errors
@@ -241,7 +241,7 @@ pub(super) fn align_levels(
     Ok(result)
 }
 
-/// Every how many points one is used; never a divisor of the row, which would pick columns.
+/// One point in this many is used; never a divisor of the row, which would pick columns.
 fn stride(points: usize, most: usize, width: usize) -> usize {
     let mut s = points.div_ceil(most.max(1)).max(1);
     while s > 1 && width.is_multiple_of(s) {
@@ -253,10 +253,10 @@ fn stride(points: usize, most: usize, width: usize) -> usize {
 fn rescale(states: &mut [State], sums: &[Sums], config: &AlignConfig) {
     for (state, sums) in states.iter_mut().zip(sums) {
         if let Some(x) = sums.geometric_mad() {
-            state.geometric_scale = x.max(config.min_geometric_scale);
+            state.geometric_scale = x.max(config.min_geometric_scale as f32);
         }
         if let Some(x) = sums.photometric_mad() {
-            state.photometric_sigma = x.max(config.min_photometric_sigma);
+            state.photometric_sigma = x.max(config.min_photometric_sigma as f32);
         }
     }
 }
@@ -293,14 +293,15 @@ fn build(
             bias: state.bias as f32,
             geometric_scale: state.geometric_scale,
             photometric_sigma: state.photometric_sigma,
-            photometric_weight: config.photometric_weight,
-            geometric_weight: config.geometric_weight,
-            kernel_width: config.kernel_width,
-            gate: (config.depth_gate * (1 << level.min(8)) as f32).min(config.max_gate),
-            normal_cos: config.normal_cos,
-            pixel_noise: config.pixel_noise,
+            photometric_weight: config.photometric_weight as f32,
+            geometric_weight: config.geometric_weight as f32,
+            kernel_width: config.kernel_width as f32,
+            gate: (config.depth_gate as f32 * (1 << level.min(8)) as f32)
+                .min(config.max_gate as f32),
+            normal_cos: config.normal_cos as f32,
+            pixel_noise: config.pixel_noise as f32,
             noise: current.noise,
-            stride: stride(points.len(), config.max_points, current.levels[level].width),
+            stride: stride(points.len(), config.max_points as usize, current.levels[level].width),
         };
         let sums = evaluate(&reference.pyramid.levels[level], points, &model);
         // Exposure is eliminated (Schur complement); a weak prior keeps it near (1, 0).

@@ -12,7 +12,7 @@ const PER_CELL: usize = 4;
 const REACH: i32 = 13;
 
 #[derive(Clone, Debug)]
-struct Feature {
+struct Corner {
     p: DVec3,
     u: f64,
     v: f64,
@@ -21,8 +21,8 @@ struct Feature {
 
 /// The corners of one frame.
 #[derive(Clone, Debug)]
-pub(super) struct Features {
-    list: Vec<Feature>,
+pub(super) struct Corners {
+    list: Vec<Corner>,
     focal: f64,
 }
 
@@ -48,7 +48,7 @@ impl Random {
     }
 }
 
-/// The 256 pixel pairs of the descriptor: sums of uniforms, so mostly near the centre.
+/// Returns the 256 pixel pairs of the descriptor: sums of uniforms, so mostly near the centre.
 fn pattern() -> Vec<[i32; 4]> {
     let mut random = Random(7);
     let mut draw = || {
@@ -58,11 +58,11 @@ fn pattern() -> Vec<[i32; 4]> {
     (0..256).map(|_| [draw(), draw(), draw(), draw()]).collect()
 }
 
-impl Features {
-    pub fn new(pyramid: &RgbdPyramid) -> Features {
+impl Corners {
+    pub fn new(pyramid: &RgbdPyramid) -> Corners {
         let level = &pyramid.levels[0];
         let (w, h) = (level.width, level.height);
-        let mut out = Features { list: Vec::new(), focal: f64::from(level.fx) };
+        let mut out = Corners { list: Vec::new(), focal: f64::from(level.fx) };
         if w < 64 || h < 48 {
             return out;
         }
@@ -143,7 +143,7 @@ impl Features {
                         (u as f64 - f64::from(level.cx)) / f64::from(level.fx),
                         (v as f64 - f64::from(level.cy)) / f64::from(level.fy),
                     );
-                    out.list.push(Feature { p: DVec3::new(x * z, y * z, z), u: x, v: y, bits });
+                    out.list.push(Corner { p: DVec3::new(x * z, y * z, z), u: x, v: y, bits });
                 }
             }
         }
@@ -151,8 +151,8 @@ impl Features {
     }
 
     /// Mutual nearest neighbours that are clearly better than the second: (own, other).
-    fn matches(&self, other: &Features) -> Vec<(usize, usize)> {
-        let nearest = |f: &Feature, list: &[Feature]| {
+    fn matches(&self, other: &Corners) -> Vec<(usize, usize)> {
+        let nearest = |f: &Corner, list: &[Corner]| {
             let (mut best, mut second, mut at) = (u32::MAX, u32::MAX, 0);
             for (i, g) in list.iter().enumerate() {
                 let d: u32 = (0..4).map(|k| (f.bits[k] ^ g.bits[k]).count_ones()).sum();
@@ -181,7 +181,7 @@ impl Features {
 
     /// Pose of `current` relative to this frame from matched corners; `None` with too few that
     /// agree. Deterministic.
-    pub fn locate(&self, current: &Features) -> Option<MatchedPose> {
+    pub fn locate(&self, current: &Corners) -> Option<MatchedPose> {
         let matches = self.matches(current);
         if matches.len() < 8 {
             return None;
@@ -229,7 +229,7 @@ impl Features {
     }
 }
 
-/// The rigid motion that takes triangle b to triangle a, when their sides agree.
+/// Returns the rigid motion that takes triangle b to triangle a, when their sides agree.
 fn three_points(a: &[DVec3; 3], b: &[DVec3; 3]) -> Option<Pose> {
     for k in 0..3 {
         let (x, y) = ((a[k] - a[(k + 1) % 3]).length(), (b[k] - b[(k + 1) % 3]).length());

@@ -1,4 +1,5 @@
-//! RGB-D alignment on the host: where every frame's pose starts.
+#![doc = include_str!("../README.md")]
+//! # How it works
 //!
 //! [`align`] estimates one pose from one or several reference images at once (projective
 //! point-to-plane plus photometric residuals, coarse to fine, robust); [`Odometer`] decides what to
@@ -11,21 +12,24 @@ mod align;
 mod calibration;
 mod config;
 mod features;
+mod keyframe;
 mod linear;
 mod odometer;
 mod pose_graph;
 mod pyramid;
 mod registration;
+mod registration_search;
 mod residuals;
 mod saved;
 mod thumbnail;
 
 pub use align::{Alignment, Reference, align, align_many};
 pub use config::{AlignConfig, OdometryConfig, PyramidConfig};
-pub use odometer::{Keyframe, LostReason, Odometer, OdometryResult, Quality};
+pub use keyframe::OdometryKeyframe;
+pub use odometer::{LostReason, Odometer, OdometryResult, Quality};
 pub use pose_graph::{Edge, PoseGraph};
 pub use pyramid::RgbdPyramid;
-pub use registration::ColourRegistration;
+pub use registration::ColorRegistration;
 pub use saved::{OdometerState, Rebuild, since};
 
 #[cfg(test)]
@@ -33,6 +37,7 @@ mod tests;
 
 /// Why an alignment could not even be tried.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum OdometryError {
     /// An image does not have the size of the camera.
     #[error("frame {frame}: {image}: found {found} pixels, expected {expected}")]

@@ -4,10 +4,11 @@ use super::{
     align::{Alignment, Reference, align_levels},
     calibration::Calibration,
     config::OdometryConfig,
-    features::Features,
+    features::Corners,
+    keyframe::OdometryKeyframe,
     pose_graph::{Edge, PoseGraph},
     pyramid::RgbdPyramid,
-    registration::ColourRegistration,
+    registration::ColorRegistration,
     thumbnail::Thumbnail,
 };
 use alloc::{collections::BTreeMap, vec::Vec};
@@ -15,22 +16,9 @@ use glam::{DMat3, DVec3};
 use mte_slam_types::pose::Pose;
 use serde::{Deserialize, Serialize};
 
-/// A frame that others are aligned with.
-#[derive(Clone, Debug)]
-pub struct Keyframe {
-    /// Stable identifier, ascending in time.
-    pub id: usize,
-    /// `Frame::index`.
-    pub frame: usize,
-    /// Its present pose.
-    pub world_from_camera: Pose,
-    pub(super) pyramid: RgbdPyramid,
-    pub(super) thumbnail: Thumbnail,
-    pub(super) features: Features,
-}
-
 /// Why a frame counts as lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum LostReason {
     /// The frame has next to no depth.
     NoDepth,
@@ -93,7 +81,7 @@ pub(super) struct Tracked {
 #[derive(Debug)]
 pub struct Odometer {
     pub(super) config: OdometryConfig,
-    pub(super) keyframes: Vec<Keyframe>,
+    pub(super) keyframes: Vec<OdometryKeyframe>,
     pub(super) next_id: usize,
     pub(super) last: Option<(RgbdPyramid, Pose)>,
     /// `last_from_previous^-1` motion of the last step in the camera frame.
@@ -123,23 +111,23 @@ impl Odometer {
         }
     }
 
-    /// The settings.
+    /// Returns the settings.
     pub fn config(&self) -> &OdometryConfig {
         &self.config
     }
 
     /// Where the colour image has been found to lie on the depth image; the identity as long as
     /// nothing speaks against it.
-    pub fn colour_registration(&self) -> ColourRegistration {
+    pub fn color_registration(&self) -> ColorRegistration {
         self.calibration.registration
     }
 
     /// The keyframes that are kept, oldest first.
-    pub fn keyframes(&self) -> &[Keyframe] {
+    pub fn keyframes(&self) -> &[OdometryKeyframe] {
         &self.keyframes
     }
 
-    /// Correct a keyframe's pose from outside (the mapper refines it). Frames located relative to
+    /// Corrects a keyframe's pose from outside (the mapper refines it). Frames located relative to
     /// it follow. Returns whether the keyframe is known and the pose finite.
     pub fn set_keyframe_pose(&mut self, id: usize, pose: Pose) -> bool {
         if !pose.is_finite() {
@@ -158,7 +146,7 @@ impl Odometer {
         true
     }
 
-    /// Correct the pose of the frame tracked last (a tracker against the map refined it).
+    /// Corrects the pose of the frame tracked last (a tracker against the map refined it).
     pub fn set_last_pose(&mut self, pose: Pose) {
         if !pose.is_finite() {
             return;
@@ -181,7 +169,7 @@ impl Odometer {
         }
     }
 
-    /// Correct the pose of any frame so far (the mapper refined it). The pose of a keyframe's frame
+    /// Corrects the pose of any frame so far (the mapper refined it). The pose of a keyframe's frame
     /// moves the keyframe, and with it the frames located relative to it. Returns whether the
     /// frame is known and the pose finite.
     pub fn set_frame_pose(&mut self, frame: usize, pose: Pose) -> bool {
@@ -219,7 +207,7 @@ impl Odometer {
             .collect()
     }
 
-    /// Locate a frame. `prediction`: where it is expected (`None`: constant velocity). The first
+    /// Locates a frame. `prediction`: where it is expected (`None`: constant velocity). The first
     /// frame gets the prediction as its pose.
     ///
     /// # Errors
@@ -297,7 +285,7 @@ impl Odometer {
         self.lost_streak = 0;
         let keyframe = if self.wants_keyframe(&fit, &pose, &current) {
             let id = self.add_keyframe(&current, pose, &used);
-            self.calibrate();
+            self.calibration.update(&mut self.keyframes, &mut self.poses, &self.config);
             current.register(&self.calibration.registration);
             pose = self.poses[&id];
             Some(id)
@@ -356,7 +344,7 @@ impl Odometer {
             Some(r) => align_levels(&[r], current, start, align, usize::MAX, 1)?.pose,
             None => *start,
         };
-        let chosen = self.choose(current, &coarse, self.config.references.max(1));
+        let chosen = self.choose(current, &coarse, self.config.references.max(1) as usize);
         let mut references: Vec<Reference<'_>> = chosen
             .iter()
             .map(|&k| Reference {
@@ -400,8 +388,9 @@ impl Odometer {
         self.keyframes
             .iter()
             .min_by(|a, b| {
-                let d =
-                    |k: &Keyframe| (k.world_from_camera.translation - pose.translation).length();
+                let d = |k: &OdometryKeyframe| {
+                    (k.world_from_camera.translation - pose.translation).length()
+                };
                 d(a).total_cmp(&d(b))
             })
             .map_or(0, |k| k.id)
@@ -433,15 +422,15 @@ impl Odometer {
         current: &RgbdPyramid,
         lost: bool,
     ) -> Vec<Pose> {
-        let features = Features::new(current);
+        let features = Corners::new(current);
         let mut out = Vec::new();
-        if let Some(m) = Features::new(last).locate(&features) {
+        if let Some(m) = Corners::new(last).locate(&features) {
             out.push((m.inliers, last_pose.compose(&m.reference_from_current)));
         }
         let nearby = if lost { self.alike(current, 6) } else { self.choose(current, last_pose, 2) };
         for i in nearby {
             let k = &self.keyframes[i];
-            if let Some(m) = k.features.locate(&features) {
+            if let Some(m) = k.corners.locate(&features) {
                 out.push((m.inliers, k.world_from_camera.compose(&m.reference_from_current)));
             }
         }
@@ -450,7 +439,7 @@ impl Odometer {
         out.into_iter().map(|(_, pose)| pose).collect()
     }
 
-    /// The most promising of many starts, after coarse alignment: matched corners, standing still,
+    /// Returns the most promising of many starts, after coarse alignment: matched corners, standing still,
     /// turning, moving around the scene's centre, and the keyframes that look alike when lost.
     fn search(
         &self,
@@ -531,25 +520,25 @@ impl Odometer {
     fn add_keyframe(&mut self, current: &RgbdPyramid, pose: Pose, _used: &[usize]) -> usize {
         let id = self.next_id;
         self.next_id += 1;
-        self.keyframes.push(Keyframe {
+        self.keyframes.push(OdometryKeyframe {
             id,
             frame: current.frame,
             world_from_camera: pose,
             pyramid: current.clone(),
             thumbnail: Thumbnail::new(current),
-            features: Features::new(current),
+            corners: Corners::new(current),
         });
         self.poses.insert(id, pose);
         if self.config.pose_graph {
             self.link_newest();
         }
-        if self.keyframes.len() > self.config.max_keyframes.max(2) {
+        if self.keyframes.len() > self.config.max_keyframes.max(2) as usize {
             self.drop_keyframe();
         }
         id
     }
 
-    /// Drop the keyframe that its neighbours in time can best do without.
+    /// Drops the keyframe that its neighbours in time can best do without.
     fn drop_keyframe(&mut self) {
         let n = self.keyframes.len();
         let spread = |i: usize| {
@@ -561,11 +550,11 @@ impl Odometer {
         self.keyframes.remove(victim);
     }
 
-    /// Align the newest keyframe with the others it overlaps and spread what that says over all.
+    /// Aligns the newest keyframe with the others it overlaps and spreads what that says over all.
     fn link_newest(&mut self) {
         let Some((newest, _)) = self.keyframes.split_last() else { return };
         let links = self.choose_links(newest);
-        for (share, i) in links {
+        for i in links {
             let other = &self.keyframes[i];
             let start = other.world_from_camera.inverse().compose(&newest.world_from_camera);
             let reference = Reference {
@@ -579,7 +568,6 @@ impl Odometer {
                 continue;
             };
             if fit.inlier_ratio > self.config.min_inlier_ratio && fit.unconstrained == 0 {
-                let _ = share;
                 self.edges.push(Edge {
                     i: other.id,
                     j: newest.id,
@@ -605,7 +593,7 @@ impl Odometer {
         }
     }
 
-    fn choose_links(&self, newest: &Keyframe) -> Vec<(f64, usize)> {
+    fn choose_links(&self, newest: &OdometryKeyframe) -> Vec<usize> {
         let mut shares: Vec<(f64, usize)> = self
             .keyframes
             .iter()
@@ -622,7 +610,7 @@ impl Odometer {
             .filter(|&(share, _)| share > 0.3)
             .collect();
         shares.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
-        shares.truncate(self.config.graph_links);
-        shares
+        shares.truncate(self.config.graph_links as usize);
+        shares.into_iter().map(|(_, i)| i).collect()
     }
 }

@@ -1,6 +1,6 @@
 //! A frame as the alignment wants it: intensity with gradients, depth, local planes, at several
 //! sizes.
-use super::{OdometryError, config::PyramidConfig, registration::ColourRegistration};
+use super::{OdometryError, config::PyramidConfig, registration::ColorRegistration};
 use alloc::{vec, vec::Vec};
 use glam::DVec3;
 use mte_slam_types::{camera::Camera, frame::Frame, pose::Pose};
@@ -50,14 +50,14 @@ pub struct RgbdPyramid {
     /// Intensity as recorded, full size.
     pub(super) intensity: Vec<f32>,
     /// What `intensity` has been resampled with for the levels.
-    pub(super) registration: ColourRegistration,
+    pub(super) registration: ColorRegistration,
 }
 
 impl RgbdPyramid {
     /// Fewest usable depth pixels that an alignment accepts.
     pub const MIN_POINTS: usize = 300;
 
-    /// Prepare a frame. `depth_unit_m`: metres per unit of `Frame::depth`.
+    /// Prepares a frame. `depth_unit_m`: metres per unit of `Frame::depth`.
     ///
     /// # Errors
     /// [`OdometryError::ImageSize`]. A frame without depth is accepted here and refused by
@@ -100,7 +100,7 @@ impl RgbdPyramid {
         Ok(Self::from_images(frame.index, intensity, depth, camera, config))
     }
 
-    /// The same from intensity (0..1) and depth (m, 0: none), both row-major of the camera's size.
+    /// Prepares one from intensity (0..1) and depth (m, 0: none), both row-major of the camera's size.
     pub(super) fn from_images(
         frame: usize,
         mut intensity: Vec<f32>,
@@ -115,7 +115,7 @@ impl RgbdPyramid {
         loop {
             let (w, h) = (camera.width as usize, camera.height as usize);
             levels.push(Level::new(&camera, &intensity, &depth, config, noise));
-            if levels.len() >= config.levels.max(1)
+            if levels.len() >= config.levels.max(1) as usize
                 || camera.width.min(camera.height) / 2 < config.smallest_side.max(8)
             {
                 break;
@@ -137,12 +137,12 @@ impl RgbdPyramid {
             median_depth_m,
             noise,
             intensity: recorded,
-            registration: ColourRegistration::default(),
+            registration: ColorRegistration::default(),
         }
     }
 
-    /// Resample the colour so that it lies on the depth; nothing to do when it already is so.
-    pub(super) fn register(&mut self, registration: &ColourRegistration) {
+    /// Resamples the colour so that it lies on the depth; nothing to do when it already is so.
+    pub(super) fn register(&mut self, registration: &ColorRegistration) {
         if self.registration == *registration {
             return;
         }
@@ -176,17 +176,17 @@ impl RgbdPyramid {
         }
     }
 
-    /// Number of pixels with usable depth at full size.
+    /// Returns the number of pixels with usable depth at full size.
     pub fn usable_points(&self) -> usize {
         self.levels[0].points.len()
     }
 
-    /// Median of the usable depths \[m\]; 0 when there are none.
+    /// Returns the median of the usable depths \[m\]; 0 when there are none.
     pub fn median_depth_m(&self) -> f64 {
         self.median_depth_m
     }
 
-    /// Share of the current frame's points (at a small size) that this image sees at about their
+    /// Returns the share of the current frame's points (at a small size) that this image sees at about their
     /// depth, given both poses (`world_from_camera`).
     pub(super) fn visible_share(
         &self,
@@ -242,7 +242,7 @@ pub(super) fn halve_intensity(image: &[f32], w: usize, h: usize) -> Vec<f32> {
     out
 }
 
-/// Mean of those of the four depths that lie on one surface: a mean over a step would invent
+/// Returns the mean of those of the four depths that lie on one surface: a mean over a step would invent
 /// points in the air.
 fn halve_depth(depth: &[f32], w: usize, h: usize, noise: [f32; 2]) -> Vec<f32> {
     let (hw, hh) = (w / 2, h / 2);
@@ -278,7 +278,7 @@ fn halve_depth(depth: &[f32], w: usize, h: usize, noise: [f32; 2]) -> Vec<f32> {
 }
 
 impl Level {
-    /// Replace the intensity and its gradients.
+    /// Replaces the intensity and its gradients.
     fn set_intensity(&mut self, intensity: &[f32]) {
         let (w, h) = (self.width, self.height);
         let mut points = self.points.iter_mut();

@@ -34,7 +34,7 @@ pub(super) struct Model {
     pub normal_cos: f32,
     pub pixel_noise: f32,
     pub noise: [f32; 2],
-    /// Every how many points one is used.
+    /// One point in this many is used.
     pub stride: usize,
 }
 
@@ -134,7 +134,7 @@ fn bin_start(i: usize) -> f32 {
     f32::from_bits(((i + (127 - 24) * 8) as u32) << 20)
 }
 
-/// Median of what a histogram holds, linear within the bin.
+/// Returns the median of what a histogram holds, linear within the bin.
 fn median(bins: &[u32]) -> Option<f32> {
     let total: u32 = bins.iter().sum();
     if total < 16 {

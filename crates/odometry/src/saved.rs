@@ -5,11 +5,12 @@
 use super::{
     OdometryError,
     config::OdometryConfig,
-    features::Features,
-    odometer::{Keyframe, Odometer, Tracked},
+    features::Corners,
+    keyframe::OdometryKeyframe,
+    odometer::{Odometer, Tracked},
     pose_graph::Edge,
     pyramid::RgbdPyramid,
-    registration::ColourRegistration,
+    registration::ColorRegistration,
     thumbnail::Thumbnail,
 };
 use alloc::{collections::BTreeMap, vec::Vec};
@@ -41,18 +42,18 @@ pub struct OdometerState {
 }
 
 /// A change of registration: from this frame on (with the keyframe made of it) colours lie there.
-pub type Registrations = [(usize, ColourRegistration)];
+pub type Registrations = [(usize, ColorRegistration)];
 
-/// The registration in force when a frame was at hand, then those that came after. `made` tells
+/// Returns the registration in force when a frame was at hand, then those that came after. `made` tells
 /// whether the change made by the frame itself came first.
 pub fn since(
     registrations: &Registrations,
     frame: usize,
     made: bool,
-) -> (ColourRegistration, &Registrations) {
+) -> (ColorRegistration, &Registrations) {
     let before = |at: usize| if made { at <= frame } else { at < frame };
     let n = registrations.iter().take_while(|(at, _)| before(*at)).count();
-    let first = n.checked_sub(1).map_or(ColourRegistration::default(), |i| registrations[i].1);
+    let first = n.checked_sub(1).map_or(ColorRegistration::default(), |i| registrations[i].1);
     (first, &registrations[n..])
 }
 
@@ -131,7 +132,7 @@ impl Odometer {
 pub struct Rebuild {
     config: OdometryConfig,
     state: OdometerState,
-    keyframes: BTreeMap<usize, Keyframe>,
+    keyframes: BTreeMap<usize, OdometryKeyframe>,
     last: Option<RgbdPyramid>,
 }
 
@@ -163,12 +164,12 @@ impl Rebuild {
             pyramid.register(registration);
         }
         for k in saved {
-            let keyframe = Keyframe {
+            let keyframe = OdometryKeyframe {
                 id: k.id,
                 frame: k.frame,
                 world_from_camera: k.world_from_camera,
                 thumbnail: Thumbnail::new(&pyramid),
-                features: Features::new(&pyramid),
+                corners: Corners::new(&pyramid),
                 pyramid: pyramid.clone(),
             };
             self.keyframes.insert(k.id, keyframe);
@@ -179,8 +180,8 @@ impl Rebuild {
         Ok(())
     }
 
-    /// The odometer; `None` while frames are missing.
-    pub fn finish(self, registration: ColourRegistration) -> Option<Odometer> {
+    /// Returns the odometer; `None` while frames are missing.
+    pub fn finish(self, registration: ColorRegistration) -> Option<Odometer> {
         let Rebuild { config, state, keyframes, last } = self;
         if keyframes.len() != state.keyframes.len() || last.is_some() != state.last.is_some() {
             return None;
@@ -207,7 +208,7 @@ mod tests {
 
     #[test]
     fn registrations_are_replayed_from_the_right_one_on() {
-        let r = |scale| ColourRegistration { scale };
+        let r = |scale| ColorRegistration { scale };
         let all = [(3, r(0.9)), (7, r(0.95))];
         assert_eq!(since(&all, 2, true), (r(1.0), &all[..]));
         assert_eq!(since(&all, 3, true), (r(0.9), &all[1..]));

@@ -194,7 +194,13 @@ fn a_view_of_something_else_is_lost_and_adds_no_keyframe() {
 
 #[test]
 fn a_walk_stays_on_course_and_follows_corrections() {
-    let mut odometer = Odometer::new(OdometryConfig::default());
+    for pose_graph in [false, true] {
+        walk(OdometryConfig { pose_graph, ..OdometryConfig::default() });
+    }
+}
+
+fn walk(config: OdometryConfig) {
+    let mut odometer = Odometer::new(config);
     let mut truth = Pose::IDENTITY;
     let step = Pose::from_twist(&[0.02, 0.005, 0.015, 0.004, -0.01, 0.006]);
     for i in 0..12 {
@@ -268,13 +274,13 @@ fn a_colour_camera_of_another_focal_length_is_found_and_an_equal_one_left_alone(
         let views: Vec<_> =
             poses.iter().map(|p| render_unregistered(&room(), p, true, scale)).collect();
         let pairs: Vec<_> = [(0, 1), (1, 2), (0, 2)]
-            .map(|(i, j)| registration::Pair {
+            .map(|(i, j)| registration_search::Pair {
                 reference: &views[i],
                 current: &views[j],
                 reference_from_current: poses[i].inverse().compose(&poses[j]),
             })
             .into();
-        let found = registration::estimate(&pairs).scale;
+        let found = registration_search::estimate(&pairs).scale;
         assert!((found - scale).abs() < 0.01, "found {found}, expected {scale}");
     }
 }

@@ -16,7 +16,7 @@ struct Node {
 }
 
 /// A bounding volume hierarchy built by the surface-area rule.
-pub struct Bvh {
+pub struct PrimitiveBvh {
     nodes: Vec<Node>,
     order: Vec<u32>,
 }
@@ -37,11 +37,12 @@ fn area(min: Vec3, max: Vec3) -> f32 {
     e.x * e.y + e.y * e.z + e.z * e.x
 }
 
-impl Bvh {
-    /// Build over all primitives.
-    pub fn new(primitives: &[Primitive]) -> Bvh {
+impl PrimitiveBvh {
+    /// Builds over all primitives.
+    pub fn new(primitives: &[Primitive]) -> PrimitiveBvh {
         let boxes: Vec<(Vec3, Vec3)> = primitives.iter().map(Primitive::bounds).collect();
-        let mut bvh = Bvh { nodes: Vec::new(), order: (0..primitives.len() as u32).collect() };
+        let mut bvh =
+            PrimitiveBvh { nodes: Vec::new(), order: (0..primitives.len() as u32).collect() };
         let empty = Node { min: Vec3::ZERO, max: Vec3::ZERO, first: 0, count: 0 };
         bvh.nodes.push(empty);
         let mut work = vec![(0usize, 0usize, primitives.len(), 0usize)];
@@ -90,7 +91,7 @@ impl Bvh {
         bvh
     }
 
-    /// Visit the leaves a ray touches before `limit`, nearer children first; `visit` gets a
+    /// Visits the leaves a ray touches before `limit`, nearer children first; `visit` gets a
     /// primitive and the current limit and returns the new one, or `None` to stop.
     fn walk(&self, o: Vec3, d: Vec3, limit: f32, mut visit: impl FnMut(u32, f32) -> Option<f32>) {
         let inv = d.recip();
@@ -144,7 +145,7 @@ impl Bvh {
         }
     }
 
-    /// The nearest hit before `limit`.
+    /// Returns the nearest hit before `limit`.
     pub fn nearest(&self, primitives: &[Primitive], o: Vec3, d: Vec3, limit: f32) -> Option<Hit> {
         let mut best = None;
         self.walk(o, d, limit, |p, limit| {
@@ -157,7 +158,7 @@ impl Bvh {
         best
     }
 
-    /// Whether anything is hit before `limit`; rays start a little off their surface.
+    /// Returns whether anything is hit before `limit`; rays start a little off their surface.
     pub fn blocked(&self, primitives: &[Primitive], o: Vec3, d: Vec3, limit: f32) -> bool {
         let mut found = false;
         self.walk(o, d, limit, |p, limit| {

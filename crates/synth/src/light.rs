@@ -1,14 +1,13 @@
 //! Diffuse light, computed once into small maps on every face: soft shadows of two area lights and
 //! ambient occlusion. The result does not depend on the view.
 use super::{
-    bvh::Bvh,
+    bvh::PrimitiveBvh,
     math::{floor, fract, hash, sin_cos, unit},
-    par_chunks,
-    scene::Room,
     shape::{Chart, Primitive, Shape},
 };
 use alloc::{vec, vec::Vec};
 use glam::Vec3;
+use mte_slam_types::parallel;
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
@@ -61,18 +60,18 @@ fn tangents(n: Vec3) -> (Vec3, Vec3) {
 }
 
 impl LightMaps {
-    /// Bake the light of `lights` and a sky of `ambient` in the scene.
+    /// Bakes the light of `lights` and a sky of `ambient` in the scene.
     pub fn bake(
-        room: &Room,
+        shell: &Primitive,
         primitives: &[Primitive],
-        bvh: &Bvh,
+        bvh: &PrimitiveBvh,
         lights: &[Light],
         ambient: Vec3,
     ) -> LightMaps {
         let mut maps = vec![[Map::default(); 6]; primitives.len() + 1];
         let mut texels_of = Vec::new();
         for (id, faces) in maps.iter_mut().enumerate() {
-            let solid = primitives.get(id).unwrap_or(&room.shell);
+            let solid = primitives.get(id).unwrap_or(shell);
             for &face in solid.faces() {
                 let half = solid.face_half(face);
                 let size = half.map(|h| ((2.0 * h / TEXEL_M) as i32 + 1).clamp(2, 160) as u16);
@@ -86,7 +85,7 @@ impl LightMaps {
         }
         let rays = hemisphere();
         let mut texels = vec![Vec3::ZERO; texels_of.len()];
-        par_chunks(&mut texels, 256, |chunk, out| {
+        parallel::for_chunks(&mut texels, 256, |chunk, out| {
             for (k, e) in out.iter_mut().enumerate() {
                 let index = chunk * 256 + k;
                 let (id, face, i, j, size) = texels_of[index];
@@ -95,7 +94,7 @@ impl LightMaps {
                 let (p, n) = match primitives.get(id as usize) {
                     Some(solid) => solid.surface(face, a, b),
                     None => {
-                        let (p, n) = room.shell.surface(face, a, b);
+                        let (p, n) = shell.surface(face, a, b);
                         (p, -n)
                     }
                 };
@@ -126,7 +125,7 @@ impl LightMaps {
 
 fn irradiance(
     primitives: &[Primitive],
-    bvh: &Bvh,
+    bvh: &PrimitiveBvh,
     lights: &[Light],
     ambient: Vec3,
     rays: &[Vec3],

@@ -4,19 +4,14 @@
 //! bytes everywhere.
 use glam::Vec3;
 
-/// One round of PCG's output permutation: a good 32-bit integer hash.
-pub fn hash(x: u32) -> u32 {
-    let s = x.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-    let w = ((s >> ((s >> 28) + 4)) ^ s).wrapping_mul(277_803_737);
-    (w >> 22) ^ w
-}
+pub use mte_slam_types::maths::pcg as hash;
 
 /// Hash of a lattice cell.
 pub fn hash2(x: i32, y: i32, seed: u32) -> u32 {
     hash((x as u32).wrapping_mul(0x9E37_79B1) ^ hash((y as u32) ^ seed))
 }
 
-/// A hash as a number in [0, 1).
+/// Returns a hash as a number in [0, 1).
 pub fn unit(h: u32) -> f32 {
     (h >> 8) as f32 * (1.0 / 16_777_216.0)
 }
@@ -37,7 +32,7 @@ pub fn mix(a: Vec3, b: Vec3, k: f32) -> Vec3 {
     a + (b - a) * k.clamp(0.0, 1.0)
 }
 
-/// Value noise in [-1, 1] on a unit lattice.
+/// Returns value noise in [-1, 1] on a unit lattice.
 pub fn noise(x: f32, y: f32, seed: u32) -> f32 {
     let (i, j) = (floor(x), floor(y));
     let (u, v) = (x - i as f32, y - j as f32);
@@ -88,7 +83,7 @@ pub fn sin_cos(x: f64) -> (f64, f64) {
     }
 }
 
-/// An angle-like number in [0, 1) of a direction in the plane, without trigonometry.
+/// Returns an angle-like number in [0, 1) of a direction in the plane, without trigonometry.
 pub fn diamond(x: f32, y: f32) -> f32 {
     let sum = x.abs() + y.abs();
     if sum == 0.0 {
@@ -102,7 +97,7 @@ pub fn diamond(x: f32, y: f32) -> f32 {
     }
 }
 
-/// The unit vector with this [`diamond`] number.
+/// Returns the unit vector with this [`diamond`] number.
 pub fn from_diamond(a: f32) -> (f32, f32) {
     let q = fract(a) * 4.0;
     let y = if q < 1.0 {
@@ -124,12 +119,12 @@ pub struct Rng {
 }
 
 impl Rng {
-    /// A stream of its own for each seed.
+    /// Starts a stream of its own for each seed.
     pub fn new(seed: u64) -> Self {
         Rng { seed: hash(seed as u32 ^ hash((seed >> 32) as u32 ^ 0x5EED)), counter: 0 }
     }
 
-    /// The next 32 bits.
+    /// Returns the next 32 bits.
     pub fn next(&mut self) -> u32 {
         self.counter += 1;
         hash(self.seed ^ hash(self.counter))

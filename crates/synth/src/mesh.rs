@@ -95,7 +95,7 @@ fn patch(solid: &Primitive, face: u8) -> Patch {
     }
 }
 
-/// Tessellate everything that can be seen.
+/// Tessellates everything that can be seen.
 pub fn build(scene: &Scene) -> SyntheticMesh {
     let mut mesh = SyntheticMesh::default();
     for (id, solid) in scene.solids() {

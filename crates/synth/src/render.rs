@@ -1,9 +1,9 @@
 //! From the scene to images: one ray through each pixel's centre for depth and label, four
 //! samples for its colour.
-use super::{bvh::Hit, par_chunks, scene::Scene};
+use super::{bvh::Hit, scene::Scene};
 use alloc::{vec, vec::Vec};
 use glam::Vec3;
-use mte_slam_types::{camera::Camera, pose::Pose};
+use mte_slam_types::{camera::Camera, parallel, pose::Pose};
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
@@ -56,18 +56,18 @@ pub fn display(c: Vec3) -> [u8; 3] {
     to_srgb(c)
 }
 
-/// Render the view of `camera` at `pose`.
+/// Renders the view of `camera` at `pose`.
 pub fn render(scene: &Scene, camera: &Camera, pose: &Pose) -> Image {
     let (w, h) = (camera.width as usize, camera.height as usize);
     let rays = Rays::new(camera, pose);
     let mut hits = vec![Hit { t: 0.0, primitive: 0, face: 0 }; w * h];
-    par_chunks(&mut hits, w, |v, row| {
+    parallel::for_chunks(&mut hits, w, |v, row| {
         for (u, hit) in row.iter_mut().enumerate() {
             *hit = scene.trace(rays.origin, rays.direction(u as f32, v as f32));
         }
     });
     let mut color = vec![[0u8; 3]; w * h];
-    par_chunks(&mut color, w, |v, row| {
+    parallel::for_chunks(&mut color, w, |v, row| {
         for (u, out) in row.iter_mut().enumerate() {
             let hit = hits[v * w + u];
             // The samples see what this pixel and its neighbours see: no search of the scene.

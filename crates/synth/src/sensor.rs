@@ -6,16 +6,18 @@ use super::{
 use alloc::vec::Vec;
 use mte_slam_types::camera::Camera;
 
+/// Metres per unit of the depth images, as in Replica.
+pub const DEPTH_UNIT_M: f64 = 1.0 / 6553.5;
 /// Kinect's focal length times baseline, in its 640 x 480 pixels times metres.
 const FOCAL_BASELINE: f32 = 580.0 * 0.075;
-/// It tells disparities apart in eighths of a pixel.
+/// Disparities are told apart in eighths of a pixel.
 const DISPARITY_STEPS: f32 = 8.0;
 const NEAREST_M: f32 = 0.35;
 const FARTHEST_M: f32 = 5.5;
 
 /// Depth \[m\] in units of the sequence, 0 (invalid) where it does not fit.
 pub fn quantise(depth_m: f32) -> u16 {
-    let units = f64::from(depth_m) / super::DEPTH_UNIT_M + 0.5;
+    let units = f64::from(depth_m) / DEPTH_UNIT_M + 0.5;
     if (1.0..65536.0).contains(&units) { units as u16 } else { 0 }
 }
 

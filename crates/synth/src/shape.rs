@@ -64,7 +64,7 @@ impl Primitive {
         }
     }
 
-    /// Smallest and largest corner of the world-aligned bounding box.
+    /// Returns the smallest and largest corner of the world-aligned bounding box.
     pub fn bounds(&self) -> (Vec3, Vec3) {
         let m = self.rotation;
         let e = m.x_axis.abs() * self.half.x
@@ -73,7 +73,7 @@ impl Primitive {
         (self.centre - e, self.centre + e)
     }
 
-    /// A world point in the primitive's frame.
+    /// Returns a world point in the primitive's frame.
     pub fn to_local(&self, p: Vec3) -> Vec3 {
         let v = p - self.centre;
         Vec3::new(
@@ -149,7 +149,7 @@ impl Primitive {
         }
     }
 
-    /// Whether a world point is inside the solid.
+    /// Returns whether a world point is inside the solid.
     pub fn contains(&self, p: Vec3) -> bool {
         let q = self.to_local(p);
         match self.shape {
@@ -162,7 +162,7 @@ impl Primitive {
         }
     }
 
-    /// The chart of a point of a face given in the primitive's frame.
+    /// Returns the chart of a point of a face given in the primitive's frame.
     pub fn chart(&self, face: u8, q: Vec3) -> Chart {
         let h = self.half;
         let at = |x: f32, r: f32| if r > 0.0 { 0.5 + 0.5 * x / r } else { 0.5 };
@@ -193,7 +193,7 @@ impl Primitive {
         self.chart(face, Vec3::ZERO).half
     }
 
-    /// The point of a face at chart position (a, b), and the outward normal, in the world.
+    /// Returns the point of a face at chart position (a, b), and the outward normal, in the world.
     pub fn surface(&self, face: u8, a: f32, b: f32) -> (Vec3, Vec3) {
         let h = self.half;
         let (p, q) = (2.0 * a - 1.0, 2.0 * b - 1.0);

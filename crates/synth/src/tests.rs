@@ -1,7 +1,12 @@
 //! Tests of the sequence as a whole.
-use super::*;
+use super::{sensor::DEPTH_UNIT_M, *};
 use alloc::{collections::BTreeSet, vec, vec::Vec};
 use glam::DVec3;
+use mte_slam_types::{
+    frame::Frame,
+    pose::Pose,
+    sequence::{Sequence, SequenceError},
+};
 
 const KINDS: [SceneKind; 2] = [SceneKind::Room, SceneKind::Office];
 
@@ -190,7 +195,7 @@ fn depth_label_and_colour_agree_between_frames() {
     }
 }
 
-/// Distance of a point to a triangle \[m\].
+/// Returns the distance of a point to a triangle \[m\].
 fn triangle_distance(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     let n = (b - a).cross(c - a).normalize();
     let foot = p - n * (p - a).dot(n);

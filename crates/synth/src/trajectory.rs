@@ -25,7 +25,7 @@ pub struct Path {
     seed: u32,
 }
 
-/// Point of the closed uniform Catmull-Rom spline at parameter `u` (one unit a knot).
+/// Point of the closed uniform Catmull-Rom spline at parameter `u` (one unit per knot).
 fn spline(knots: &[DVec3], u: f64) -> DVec3 {
     let n = knots.len();
     let i = u as usize;
@@ -72,7 +72,7 @@ impl Path {
         path
     }
 
-    /// Frames in one round.
+    /// Returns the number of frames in one round.
     pub fn round(&self) -> f64 {
         self.pace[SAMPLES]
     }

@@ -20,12 +20,12 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Number of pixels.
+    /// Returns the number of pixels.
     pub fn pixels(&self) -> usize {
         self.width as usize * self.height as usize
     }
 
-    /// The point at `depth_m` along z behind pixel (u, v), in the camera frame \[m\].
+    /// Returns the point at `depth_m` along z behind pixel (u, v), in the camera frame \[m\].
     pub fn back_project(&self, u: f64, v: f64, depth_m: f64) -> DVec3 {
         DVec3::new((u - self.cx) / self.fx, (v - self.cy) / self.fy, 1.0) * depth_m
     }
@@ -40,7 +40,7 @@ impl Camera {
         })
     }
 
-    /// The camera of an image made by keeping the centre of each `step` x `step` block
+    /// Returns the camera of an image made by keeping the centre of each `step` x `step` block
     /// (nearest-neighbour subsampling at pixel `step * i + (step - 1) / 2`) or averaging it.
     pub fn downscaled(&self, step: u32) -> Camera {
         let s = f64::from(step);

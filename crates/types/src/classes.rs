@@ -25,12 +25,12 @@ pub struct ClassTable {
 }
 
 impl ClassTable {
-    /// Number of classes.
+    /// Returns the number of classes.
     pub fn len(&self) -> usize {
         self.classes.len()
     }
 
-    /// Whether there are no classes (semantics are then off).
+    /// Returns whether there are no classes (semantics are then off).
     pub fn is_empty(&self) -> bool {
         self.classes.is_empty()
     }

@@ -51,7 +51,7 @@ pub struct FeatureMap {
 }
 
 impl FeatureMap {
-    /// The features on a grid of `columns` x `rows` cells that cover the part from 0 to `extent`
+    /// Returns the features on a grid of `columns` x `rows` cells that cover the part from 0 to `extent`
     /// (shares of width and height) of the image: bilinear between the map's cell centres. A cell's
     /// channels lie side by side and are scaled to a mean square of 1, for models differ in size.
     pub fn resampled(&self, columns: usize, rows: usize, extent: [f32; 2]) -> Vec<f32> {

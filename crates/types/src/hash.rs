@@ -1,4 +1,4 @@
-//! A quick hash of numbers and images: it tells whether two things are the same, not whether
+//! A quick hash of numbers and images: it shows whether two things are the same, not whether
 //! somebody made them look so.
 use crate::frame::Frame;
 
@@ -33,7 +33,7 @@ impl Hasher {
         }
     }
 
-    /// The hash of all that was taken.
+    /// Returns the hash of all that was taken.
     pub fn finish(self) -> u64 {
         self.0
     }

@@ -55,7 +55,7 @@ impl Pose {
         Pose { rotation: DMat3::from_quat(q.normalize()), translation }
     }
 
-    /// The rotation as a unit quaternion.
+    /// Returns the rotation as a unit quaternion.
     pub fn quaternion(&self) -> DQuat {
         DQuat::from_mat3(&self.rotation).normalize()
     }
@@ -86,35 +86,35 @@ impl Pose {
         }
     }
 
-    /// The inverse transform.
+    /// Returns the inverse transform.
     pub fn inverse(&self) -> Pose {
         let rotation = self.rotation.transpose();
         Pose { rotation, translation: -(rotation * self.translation) }
     }
 
-    /// Apply to a point.
+    /// Applies to a point.
     pub fn transform_point(&self, p: DVec3) -> DVec3 {
         self.rotation * p + self.translation
     }
 
-    /// Apply to a direction.
+    /// Applies to a direction.
     pub fn transform_vector(&self, v: DVec3) -> DVec3 {
         self.rotation * v
     }
 
-    /// The rotation angle \[rad\], accurate for small angles.
+    /// Returns the rotation angle \[rad\], accurate for small angles.
     pub fn angle_rad(&self) -> f64 {
         let q = self.quaternion();
         let s = DVec3::new(q.x, q.y, q.z).length();
         2.0 * num_traits::Float::atan2(s, q.w.abs())
     }
 
-    /// The same transform with rounding errors of the rotation removed.
+    /// Returns the same transform with rounding errors of the rotation removed.
     pub fn orthonormalised(&self) -> Pose {
         Pose { rotation: DMat3::from_quat(self.quaternion()), translation: self.translation }
     }
 
-    /// The same camera with y and z reversed: turns OpenGL's axes (y up, z backward) into ours (y
+    /// Returns the same camera with y and z reversed: turns OpenGL's axes (y up, z backward) into ours (y
     /// down, z forward), and back.
     pub fn with_flipped_camera(&self) -> Pose {
         let r = self.rotation;
@@ -122,7 +122,7 @@ impl Pose {
         Pose { rotation, translation: self.translation }
     }
 
-    /// Whether every number is finite.
+    /// Returns whether every number is finite.
     pub fn is_finite(&self) -> bool {
         self.rotation.is_finite() && self.translation.is_finite()
     }

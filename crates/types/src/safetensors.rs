@@ -24,7 +24,7 @@ const DTYPES: [(&str, usize); 12] = [
 ];
 
 /// A tensor in a file.
-pub struct Tensor<'a> {
+pub struct TensorView<'a> {
     /// Its name.
     pub name: String,
     /// One of the format's names, such as `F32`.
@@ -40,7 +40,7 @@ pub struct File<'a> {
     /// The entry `__metadata__`.
     pub metadata: Option<Value>,
     /// In the order of their names.
-    pub tensors: Vec<Tensor<'a>>,
+    pub tensors: Vec<TensorView<'a>>,
 }
 
 /// What is not as it should be.
@@ -107,7 +107,7 @@ pub fn parse(bytes: &[u8], max_header_bytes: usize) -> Result<File<'_>, Malforme
             let found = format!("{taken} bytes of tensors in {} bytes", data.len());
             return Err(wrong(tensor("data_offsets"), found, "ranges that do not overlap"));
         }
-        tensors.push(Tensor { name, dtype: (*dtype).to_string(), shape, bytes });
+        tensors.push(TensorView { name, dtype: (*dtype).to_string(), shape, bytes });
     }
     if taken != data.len() {
         let found = format!("{} bytes of data", data.len());

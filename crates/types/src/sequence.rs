@@ -7,6 +7,7 @@ use alloc::{format, string::String, vec::Vec};
 
 /// Why a recording could not be read. Every variant names the file (or the folder) it is about.
 #[derive(Clone, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SequenceError {
     /// A file is missing or its bytes could not be had.
     #[error("{file}: cannot be read: {reason}")]
@@ -61,13 +62,13 @@ impl core::fmt::Display for FrameSuffix {
 
 /// Named bytes: a folder, a zip file, an HTTP folder, files dropped on a page. Names use `/`.
 pub trait Source {
-    /// A name for messages, for example the folder's path.
+    /// Returns a name for messages, for example the folder's path.
     fn name(&self) -> &str;
-    /// All file names below the root, `/`-separated, in no particular order.
+    /// Returns all file names below the root, `/`-separated, in no particular order.
     fn list(&self) -> Result<Vec<String>, SequenceError>;
-    /// The bytes of one file.
+    /// Returns the bytes of one file.
     fn read(&self, file: &str) -> Result<Vec<u8>, SequenceError>;
-    /// The length of one file \[bytes\]. Reads all of it unless the source knows better.
+    /// Returns the length of one file \[bytes\]. Reads all of it unless the source knows better.
     fn size(&self, file: &str) -> Result<u64, SequenceError> {
         Ok(self.read(file)?.len() as u64)
     }
@@ -82,7 +83,7 @@ pub trait Source {
     }
 }
 
-/// The error of a [`Source::read_range`] that goes past the end of a file of `size` bytes.
+/// Returns the error of a [`Source::read_range`] that goes past the end of a file of `size` bytes.
 pub fn too_short(file: &str, size: u64, offset: u64, bytes: usize) -> SequenceError {
     let reason = format!("{size} bytes long, {bytes} bytes from {offset} on were expected");
     SequenceError::Read { file: file.into(), reason }
@@ -92,9 +93,9 @@ pub fn too_short(file: &str, size: u64, offset: u64, bytes: usize) -> SequenceEr
 pub trait Sequence {
     /// What is the same for all frames.
     fn info(&self) -> &SequenceInfo;
-    /// Decode frame `index` (0-based).
+    /// Decodes frame `index` (0-based).
     fn frame(&mut self, index: usize) -> Result<Frame, SequenceError>;
-    /// Labels of frame `index` alone, as in [`Frame::labels`].
+    /// Returns labels of frame `index` alone, as in [`Frame::labels`].
     fn labels(&mut self, index: usize) -> Result<Option<Vec<u8>>, SequenceError> {
         Ok(self.frame(index)?.labels)
     }
@@ -108,7 +109,7 @@ pub trait Sequence {
     }
     /// Time stamp of frame `index` \[s\] (the frame number where there are no stamps).
     fn time_s(&self, index: usize) -> f64;
-    /// The data set's own number of frame `index`, as in [`Frame::number`].
+    /// Returns the data set's own number of frame `index`, as in [`Frame::number`].
     fn number(&self, index: usize) -> u64 {
         index as u64
     }

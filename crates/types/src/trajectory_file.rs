@@ -1,4 +1,4 @@
-//! Trajectories in TUM format: one line a frame, `t x y z qx qy qz qw` of `world_from_camera`,
+//! Trajectories in TUM format: one line per frame, `t x y z qx qy qz qw` of `world_from_camera`,
 //! seconds and metres; what `evo` reads.
 use crate::pose::Pose;
 use alloc::{
@@ -8,7 +8,7 @@ use alloc::{
 use core::fmt::Write;
 use glam::DQuat;
 
-/// Text of the poses with their time stamps \[s\].
+/// Returns the text of the poses with their time stamps \[s\].
 pub fn write_tum(poses: impl Iterator<Item = (f64, Pose)>) -> String {
     let mut text = "# time_s x_m y_m z_m qx qy qz qw (world_from_camera)\n".to_string();
     for (time_s, pose) in poses {

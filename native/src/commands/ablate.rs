@@ -6,9 +6,10 @@ use crate::{
     args::{AblateArgs, AblationRow},
     class_truth::ClassTruth,
     configuration,
-    engine::{self, Chosen},
+    engine::{self, StartedEngine},
     errors::usage,
     evaluation::{self, ViewScores},
+    host::Terminal,
     input::{self, Prepared},
     output::{
         ablation::{Ablation, ClassScores, FinishedRun, Row, RunKey, Variant},
@@ -16,15 +17,18 @@ use crate::{
         metrics::Metrics,
         pictures,
     },
-    pipeline::{self, Processed},
     progress::{Progress, clock},
+    results,
     screen::Screen,
+    steps, views,
 };
 use anyhow::{Context, Result, bail};
 use mte_slam_core::{
     config::{Config, Head, Inference},
-    slam::{Slam, TrackingStatus},
+    map::HAS_SAMPLE_HEAD,
+    slam::TrackingStatus,
 };
+use mte_slam_run::{Log, Run};
 use mte_slam_types::sequence::Sequence;
 use pollster::block_on;
 use std::{
@@ -69,7 +73,7 @@ struct Planned {
     finished: Option<FinishedRun>,
 }
 
-/// Measure.
+/// Measures every row with every seed, and writes the table.
 pub fn run(args: &AblateArgs, screen: Screen) -> Result<()> {
     if let Some(seed) = args.config.seed {
         usage!("--seed {seed}: ablate runs the seeds 1 to N, expected --seeds N");
@@ -83,6 +87,9 @@ pub fn run(args: &AblateArgs, screen: Screen) -> Result<()> {
     let rows = &args.rows;
     if let Some((i, row)) = rows.iter().enumerate().find(|(i, row)| rows[..*i].contains(row)) {
         usage!("--rows: found {row:?} twice (entry {}), expected every row once", i + 1);
+    }
+    if rows.contains(&AblationRow::SampleHead) && !HAS_SAMPLE_HEAD {
+        usage!("--rows sample-head: expected a build with the feature `sample-head`");
     }
     let Prepared { mut sequence, effective, mut class_truth, record } =
         input::prepare(&args.dataset, &args.selection, &args.config, screen)?;
@@ -154,12 +161,12 @@ pub fn run(args: &AblateArgs, screen: Screen) -> Result<()> {
         let label =
             format!("run {}/{runs} ({}, seed {})", i + 1, planned.key.row, planned.key.seed);
         progress.begin_part((done * steps) as u64, label.clone());
-        let chosen = match engine.take() {
-            Some(chosen) => chosen,
+        let started = match engine.take() {
+            Some(started) => started,
             None => engine::start(&args.engine)?,
         };
         let (finished, truth) =
-            run_one(planned, chosen, sequence.as_mut(), class_truth, &mut progress)
+            run_one(planned, started, sequence.as_mut(), class_truth, &mut progress)
                 .with_context(|| label.clone())?;
         class_truth = truth;
         let json = serde_json::to_string_pretty(&finished)? + "\n";
@@ -190,7 +197,7 @@ pub fn run(args: &AblateArgs, screen: Screen) -> Result<()> {
     let first = finished.first();
     let ablation = Ablation {
         program: key.program,
-        sequence: pipeline::sequence_record(&info, &record),
+        sequence: results::sequence_record(&info, &record),
         preset: effective.preset.clone(),
         config_hash: configuration::hash(&effective.config)?,
         engine: engine_record,
@@ -332,32 +339,26 @@ fn read_run(path: &Path, key: &RunKey) -> Result<FinishedRun> {
 /// One run, from the first frame to the scores.
 fn run_one(
     planned: &Planned,
-    chosen: Chosen,
+    started: StartedEngine,
     sequence: &mut dyn Sequence,
     class_truth: ClassTruth,
     progress: &mut Progress,
 ) -> Result<(FinishedRun, ClassTruth)> {
     let start = Instant::now();
     let info = sequence.info().clone();
-    let mut slam = block_on(Slam::new(chosen.engine, planned.config.clone(), &info))
+    let mut run = block_on(Run::new(started.engine, planned.config.clone(), &info))
         .context("the map cannot be set up")?;
-    slam.set_clock(pipeline::clock_s);
-    let processed = pipeline::process(
-        &mut slam,
-        sequence,
-        &planned.key.dataset,
-        Processed::default(),
-        None,
-        progress,
-    )?;
+    let mut terminal = Terminal::new(progress, sequence);
+    steps::take_all(&mut run, sequence, &planned.key.dataset, None, &mut terminal)?;
+    let (mut slam, Log { frames, finish_s, .. }) = run.into_parts();
     let estimates = slam.trajectory();
     let truth: Vec<_> = estimates.iter().map(|e| sequence.truth(e.frame)).collect();
 
-    let mut scores = ViewScores::new(&info, class_truth, slam.colour_registration());
+    let mut scores = ViewScores::new(&info, class_truth, slam.color_registration());
     let views = estimates.iter().step_by(planned.key.render_every);
     for (i, estimate) in views.enumerate() {
-        let (frame, mut view) = pipeline::render_frame(&mut slam, sequence, estimate)?;
-        pipeline::score_view(&mut scores, &frame, &mut view)?;
+        let (frame, mut view) = views::render_frame(&mut slam, sequence, estimate)?;
+        views::score_view(&mut scores, &frame, &mut view)?;
         progress.set((info.frames + i) as u64 + 1, || "scoring views".to_owned());
     }
     let mut metrics = Metrics::default();
@@ -386,11 +387,11 @@ fn run_one(
         psnr_db: metrics.color.map(|c| c.mean_of_psnr_db),
         lost_frames: estimates.iter().filter(|e| e.status == TrackingStatus::Lost).count(),
         mapping_iteration_s: iteration_s(
-            processed.timings.iter().map(|t| t.mapping_s),
+            frames.iter().map(|f| f.mapping_s),
             m.first_iterations,
             m.iterations,
         ),
-        finish_s: processed.finish_s,
+        finish_s,
         wall_s: start.elapsed().as_secs_f64(),
         parameters: block_on(slam.parameters())?,
         small_classes: (semantics.report.small_classes.len(), semantics.small_share_percent),

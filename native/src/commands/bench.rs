@@ -15,14 +15,15 @@ use crate::{
 use anyhow::{Context, Result};
 use glam::DVec3;
 use mte_slam_core::{
+    commands::{Command, Commands},
     config::{Config, Head},
     engine::Engine,
     field::FieldShape,
     kernels::shared::{FLAG_GUIDED, FLAG_MAP, FLAG_MASK, FLAG_POSE},
     map::{
-        Batch, FrameFormat, Map, Rates, Scratch, SemanticSupervision, fusion, passes, suppressor,
+        Batch, FrameFormat, HAS_SAMPLE_HEAD, Map, Rates, Scratch, SemanticSupervision, fusion,
+        passes, suppressor,
     },
-    recording::{Command, Recording},
 };
 use mte_slam_types::{
     camera::Camera,
@@ -144,7 +145,7 @@ pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
     let (points, align_ms) = measure_align(&mut bench, &config, args.iterations)?;
     let bytes = bench.engine.allocated_bytes();
     drop(bench);
-    let semantic = (!args.no_baseline)
+    let semantic = (HAS_SAMPLE_HEAD && !args.no_baseline)
         .then(|| measure_semantic_path(&config, &args.engine, args.iterations, screen))
         .transpose()?;
 
@@ -179,6 +180,8 @@ pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
     );
     if let Some(semantic) = &semantic {
         describe_semantic_path(&mut text, semantic);
+    } else if !HAS_SAMPLE_HEAD {
+        text += "\nsemantic path: a build with the feature `sample-head` compares two heads\n";
     }
     let json = serde_json::json!({
         "engine": chosen.record,
@@ -245,7 +248,7 @@ fn set_up(mut engine: Engine, config: &Config, classes: u32) -> Result<Bench> {
     let failed = "the benchmark's map cannot be set up";
     let map = Map::new(&mut engine, config, &format, shape).context(failed)?;
     let scratch = Scratch::new(&mut engine, config, &map).context(failed)?;
-    let mut r = Recording::default();
+    let mut r = Commands::default();
     for k in 0..WINDOW {
         let pose = Pose::from_twist(&[0.1 * f64::from(k), 0.0, 0.0, 0.0, 0.3 * f64::from(k), 0.0]);
         map.frames.upload_frame(&mut r, FIRST_SLOT + k, &box_frame(&pose));
@@ -289,7 +292,7 @@ fn record(
     config: &Config,
     kind: Kind,
     iteration: u32,
-    r: &mut Recording,
+    r: &mut Commands,
 ) -> (u32, u32) {
     let Bench { map, scratch, .. } = bench;
     let s = &config.sampling;
@@ -361,7 +364,7 @@ fn measure(
     let window: Vec<(u32, bool)> = (FIRST_SLOT..FIRST_SLOT + WINDOW)
         .map(|slot| (slot, !matches!(kind, Kind::Tracking) && slot == FIRST_SLOT))
         .collect();
-    let mut r = Recording::default();
+    let mut r = Commands::default();
     bench.scratch.upload_window(&mut r, &window);
     // Warm up: pipelines are compiled on first use.
     let (rays, samples_a_ray) = record(bench, config, kind, 0, &mut r);
@@ -369,7 +372,7 @@ fn measure(
     block_on(bench.engine.synchronise())?;
 
     let begin = Instant::now();
-    let mut r = Recording::default();
+    let mut r = Commands::default();
     for i in 0..iterations {
         record(bench, config, kind, i as u32 + 1, &mut r);
         // As a run does: a few iterations a submission.
@@ -383,16 +386,16 @@ fn measure(
 
     let mut stages: Vec<Stage> = Vec::new();
     for i in 0..iterations {
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         record(bench, config, kind, (iterations + i) as u32 + 1, &mut r);
-        for command in r.commands {
+        for command in r.list {
             let Command::Dispatch { kernel, .. } = &command else {
-                bench.engine.submit(&Recording { commands: vec![command] })?;
+                bench.engine.submit(&Commands { list: vec![command] })?;
                 continue;
             };
-            let kernel = kernel.name;
+            let kernel = kernel.interface.name;
             let begin = Instant::now();
-            bench.engine.submit(&Recording { commands: vec![command] })?;
+            bench.engine.submit(&Commands { list: vec![command] })?;
             block_on(bench.engine.synchronise())?;
             let ms = ms_since(begin) / iterations as f64;
             match stages.iter_mut().find(|s| s.kernel == kernel) {
@@ -459,7 +462,7 @@ fn measure_semantic_path(
         config.semantics.head = head;
         let mut bench = set_up(engine::start(engine)?.engine, &config, classes)?;
         // A whole iteration compiles pipelines and fills the buffers that the parts read.
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         let window: Vec<_> = (FIRST_SLOT..FIRST_SLOT + WINDOW).map(|slot| (slot, true)).collect();
         bench.scratch.upload_window(&mut r, &window);
         (rays, samples_a_ray) = record(&mut bench, &config, Kind::Mapping, 0, &mut r);
@@ -483,11 +486,11 @@ fn measure_semantic_path(
     for round in 0..rounds {
         for (times, (which, train, kernels)) in times.iter_mut().zip(&plan) {
             let (bench, config) = &mut benches[*which];
-            let mut r = Recording::default();
+            let mut r = Commands::default();
             let kind = if *train { Kind::Mapping } else { Kind::Classes };
             record(bench, config, kind, round as u32 + 1, &mut r);
-            r.commands.retain(|command| match command {
-                Command::Dispatch { kernel, .. } => kernels.contains(&kernel.name),
+            r.list.retain(|command| match command {
+                Command::Dispatch { kernel, .. } => kernels.contains(&kernel.interface.name),
                 _ => true,
             });
             let begin = Instant::now();
@@ -531,7 +534,7 @@ fn measure_align(bench: &mut Bench, config: &Config, iterations: usize) -> Resul
             [p.x as f32, p.y as f32, p.z as f32, f32::from(frame.color[i][0]) / 255.0]
         })
         .collect();
-    let mut r = Recording::default();
+    let mut r = Commands::default();
     let Bench { engine, map, scratch } = bench;
     passes::upload_pixels(&mut r, scratch, &points);
     engine.submit(&r)?;

@@ -3,7 +3,7 @@ use crate::{
     args::DemoArgs,
     class_truth::ClassTruth,
     configuration, input,
-    pipeline::{self, Job},
+    pipeline::{self, RunSetup},
     record::RunRecord,
     screen::Screen,
 };
@@ -11,7 +11,7 @@ use anyhow::Result;
 use mte_slam_types::sequence::Sequence;
 use std::path::Path;
 
-/// Run SLAM on the built-in sequence.
+/// Runs SLAM on the built-in sequence.
 pub fn run(args: &DemoArgs, screen: Screen) -> Result<()> {
     let effective = configuration::effective(&args.config, "fast")?;
     let sequence = input::built_in(args.frames, args.width);
@@ -30,7 +30,7 @@ pub fn run(args: &DemoArgs, screen: Screen) -> Result<()> {
         Ok(input::true_mesh(sequence.ground_truth_mesh()))
     };
     let class_truth = ClassTruth::of_input("dataset", sequence.info());
-    let job = Job {
+    let setup = RunSetup {
         sequence: Box::new(sequence),
         record,
         effective,
@@ -40,5 +40,5 @@ pub fn run(args: &DemoArgs, screen: Screen) -> Result<()> {
         class_truth,
         truth_mesh,
     };
-    pipeline::run(job, screen)
+    pipeline::run(setup, screen)
 }

@@ -9,8 +9,9 @@ use crate::{
     output::{
         folder::replace_file, metrics::Metrics, pictures::unlabelled_id, trajectory::read_tum,
     },
-    pipeline::{restore, sequence_record},
     record::{self, RunRecord},
+    restore::restore,
+    results::sequence_record,
     screen::Screen,
 };
 use anyhow::{Context, Result, anyhow, bail};
@@ -18,7 +19,7 @@ use image::{ColorType, DynamicImage};
 use mte_slam_core::slam::View;
 use mte_slam_mesh::read_ply;
 use mte_slam_metrics::PosePair;
-use mte_slam_odometry::ColourRegistration;
+use mte_slam_odometry::ColorRegistration;
 use mte_slam_types::{
     classes::{ClassTable, UNLABELLED},
     frame::SequenceInfo,
@@ -78,7 +79,7 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
         ..Metrics::default()
     };
     let truth_from_estimate = evaluate_trajectory(out, sequence.as_ref(), &mut metrics)?;
-    let registration = ColourRegistration { scale: record.colour_scale };
+    let registration = ColorRegistration { scale: record.color_scale };
     let sni = args.miou_protocol == MiouProtocol::Sni;
     let rendered = rendered_frames(out, info.frames);
     if sni || novel.is_some() || args.inference.is_some() {
@@ -203,7 +204,7 @@ fn evaluate_renders(
     out: &Path,
     sequence: &mut dyn Sequence,
     class_truth: ClassTruth,
-    (registration, rendered): (ColourRegistration, &[usize]),
+    (registration, rendered): (ColorRegistration, &[usize]),
     screen: Screen,
     metrics: &mut Metrics,
 ) -> Result<()> {

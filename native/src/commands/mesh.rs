@@ -2,12 +2,13 @@
 use crate::{
     args::MeshArgs,
     output::{folder::replace_file, meshes},
-    pipeline::{extract_mesh, restore, shown_classes},
+    restore::{extract_mesh, restore},
     screen::Screen,
+    views::shown_classes,
 };
 use anyhow::Result;
 
-/// Extract the mesh of a checkpoint.
+/// Extracts the mesh of a checkpoint.
 pub fn run(args: &MeshArgs, screen: Screen) -> Result<()> {
     let mut slam = restore(&args.out, &args.engine, screen)?;
     let mesh = extract_mesh(&mut slam, args.resolution, screen)?;

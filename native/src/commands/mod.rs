@@ -11,5 +11,6 @@ pub mod mesh;
 pub mod render;
 pub mod run;
 pub mod serve;
+pub mod settings;
 pub mod shaders;
 pub mod synth;

@@ -2,14 +2,15 @@
 use crate::{
     args::RenderArgs,
     output::{folder::replace_file, trajectory::read_tum},
-    pipeline::{restore, shown_classes, write_view},
+    restore::restore,
     screen::Screen,
+    views::{shown_classes, write_view},
 };
 use anyhow::{Context, Result, bail};
 use mte_slam_types::pose::Pose;
 use pollster::block_on;
 
-/// Render a map from a checkpoint.
+/// Renders a map from a checkpoint.
 pub fn run(args: &RenderArgs, screen: Screen) -> Result<()> {
     // What can be wrong with a file of poses comes before anything slow.
     let mut views = chosen_poses(args)?;

@@ -4,13 +4,13 @@ use crate::{
     errors::usage,
     input::{self, Prepared},
     mesh_evaluation::MeshTruth,
-    pipeline::{self, Job},
+    pipeline::{self, RunSetup},
     screen::Screen,
 };
 use anyhow::Result;
 use std::path::Path;
 
-/// Run SLAM on a recording.
+/// Runs SLAM on a recording.
 pub fn run(args: &RunArgs, screen: Screen) -> Result<()> {
     let Some(dataset) = &args.dataset else {
         usage!("found no DATASET, expected the folder of the recording, or --resume DIR alone");
@@ -20,7 +20,7 @@ pub fn run(args: &RunArgs, screen: Screen) -> Result<()> {
     let name = input::folder_name(dataset);
     let default_out = Path::new("out").join(format!("{name}-{}", effective.preset));
     let truth_mesh = MeshTruth::find(args.mesh.as_deref(), dataset)?;
-    let job = Job {
+    let setup = RunSetup {
         sequence,
         record,
         effective,
@@ -30,5 +30,5 @@ pub fn run(args: &RunArgs, screen: Screen) -> Result<()> {
         class_truth,
         truth_mesh,
     };
-    pipeline::run(job, screen)
+    pipeline::run(setup, screen)
 }

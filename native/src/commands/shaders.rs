@@ -8,9 +8,9 @@ pub fn run(args: &ShadersArgs, screen: Screen) -> Result<()> {
     // All are composed before the first is written.
     let mut shaders = Vec::new();
     for kernel in kernels::all() {
-        let text = shader::compose(kernel, &[])
-            .with_context(|| format!("shader {} cannot be composed", kernel.name))?;
-        shaders.push((format!("{}.wgsl", kernel.name), text));
+        let text = shader::compose(kernel.interface, &[])
+            .with_context(|| format!("shader {} cannot be composed", kernel.interface.name))?;
+        shaders.push((format!("{}.wgsl", kernel.interface.name), text));
     }
     for (name, text) in &shaders {
         replace_file(&args.dir.join(name), text.as_bytes())?;

@@ -1,7 +1,7 @@
 //! `ablation.json` and `ablation.md`: what each of the semantic modules brings, over seeds.
 use super::metrics::{EngineRecord, SemanticFigures, SequenceRecord};
-use mte_slam_core::{config::Head, slam::ParameterCounts};
-use serde::{Deserialize, Serialize};
+use mte_slam_core::{config::Head, settings::Choice, slam::ParameterCounts};
+use serde::{Deserialize, Serialize, Serializer};
 use std::{collections::BTreeMap, fmt::Write};
 
 /// What makes two runs comparable; all of it must be equal for a kept run to be used.
@@ -160,7 +160,12 @@ pub struct Variant {
     /// Feature redundancy suppressor.
     pub suppressor: bool,
     /// What makes classes of features.
+    #[serde(serialize_with = "head_name")]
     pub head: Head,
+}
+
+fn head_name<S: Serializer>(head: &Head, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(head.names()[head.index()])
 }
 
 /// One row of the table.

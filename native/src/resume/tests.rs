@@ -2,9 +2,9 @@
 use super::*;
 use crate::{
     args::{EngineArgs, EngineChoice},
-    engine::{self, Chosen},
-    pipeline::process,
+    engine::{self, StartedEngine},
     screen::Screen,
+    steps,
 };
 use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
 use mte_slam_types::{
@@ -60,9 +60,9 @@ fn the_short_form_is_told_from_the_whole_command() {
 }
 
 /// The graphics engine, or `None` with a message where there is no adapter.
-fn gpu() -> Option<Chosen> {
+fn gpu() -> Option<StartedEngine> {
     match engine::start(&EngineArgs { engine: EngineChoice::Gpu, adapter: None }) {
-        Ok(chosen) => Some(chosen),
+        Ok(started) => Some(started),
         Err(error) => {
             let required = std::env::var("MTE_SLAM_REQUIRE_GPU").is_ok_and(|value| value == "1");
             assert!(!required, "MTE_SLAM_REQUIRE_GPU=1: {error:#}");
@@ -103,7 +103,7 @@ impl Sequence for Eventful {
 #[test]
 fn a_device_lost_in_the_middle_leaves_a_run_to_go_on_with() {
     const FRAMES: usize = 7;
-    let Some(chosen) = gpu() else { return };
+    let Some(started) = gpu() else { return };
     let out = tempfile::tempdir().unwrap();
     let options = SyntheticOptions { width: 64, height: 48, frames: FRAMES, ..Default::default() };
     let room = || SyntheticSequence::new(options);
@@ -114,19 +114,18 @@ fn a_device_lost_in_the_middle_leaves_a_run_to_go_on_with() {
     (config.mapping.final_iterations, config.mapping.semantic_iterations) = (4, 4);
     (config.sampling.stratified, config.sampling.surface) = (12, 4);
     let mut record = RunRecord::default();
-    record.set_engine(&chosen.record);
+    record.set_engine(&started.record);
     let quiet = Screen { quiet: true, json: false };
 
-    let event = chosen.engine.breaker().expect("a GPU engine");
+    let event = started.engine.breaker().expect("a GPU engine");
     let mut sequence = Eventful { room: room(), at: 5, event };
-    let slam = Slam::new(chosen.engine, config.clone(), sequence.info());
-    let mut slam = block_on(slam).unwrap();
+    let run = Run::new(started.engine, config.clone(), sequence.info());
+    let mut run = block_on(run).unwrap();
     let mut saver = Saver::new(out.path(), 2, &record, &sequence, None);
     saver.begin(&Invocation::default()).unwrap();
     let mut progress = quiet.progress("", FRAMES);
-    let begun = Processed::default();
-    let saving = Some(&mut saver);
-    let error = process(&mut slam, &mut sequence, "room", begun, saving, &mut progress);
+    let mut terminal = Terminal::new(&mut progress, &sequence);
+    let error = steps::take_all(&mut run, &mut sequence, "room", Some(&mut saver), &mut terminal);
     let error = saver.failed(error.err().expect("the device is gone"));
     let kind = error.downcast_ref::<Interrupted>().expect("a typed error");
     assert!(kind.device && kind.frames == Some(4), "{error:#}");
@@ -135,17 +134,19 @@ fn a_device_lost_in_the_middle_leaves_a_run_to_go_on_with() {
         matches!(cause, Some(SlamError::Engine(EngineError::DeviceLost { .. })))
     };
     assert!(error.chain().any(is_loss), "{error:#}");
-    drop(slam);
+    drop(run);
 
     // Another engine takes over what was saved, and says that it has.
     let saved = find(out.path()).unwrap().expect("a checkpoint");
-    assert_eq!(saved.frames(), Some(4));
+    assert_eq!(saved.frames(), 4);
     let mut sequence = room();
     record.set_engine(
         &engine::start(&EngineArgs { engine: EngineChoice::Cpu, adapter: None }).unwrap().record,
     );
-    let (mut slam, begun) = saved.resume(Engine::cpu(), &config, &mut sequence, &record).unwrap();
-    let done = process(&mut slam, &mut sequence, "room", begun, None, &mut progress).unwrap();
-    assert_eq!((done.timings.len(), slam.trajectory().len()), (FRAMES, FRAMES));
-    assert!(done.notes[0].contains("resumed after frame 4 on another engine"), "{:?}", done.notes);
+    let resumed = saved.resume(Engine::cpu(), &config, &mut sequence, &record, &mut terminal);
+    let mut run = resumed.unwrap();
+    steps::take_all(&mut run, &mut sequence, "room", None, &mut terminal).unwrap();
+    let (slam, log) = run.into_parts();
+    assert_eq!((log.frames.len(), slam.trajectory().len()), (FRAMES, FRAMES));
+    assert!(log.notes[0].contains("resumed after frame 4 on another engine"), "{:?}", log.notes);
 }

@@ -3,11 +3,11 @@
 //! What there is, is asked of the command line itself, so a new flag of `run` is a new key here.
 use crate::{
     args::{Cli, Command, RunArgs},
-    configuration::edit_distance,
     errors::usage,
 };
 use anyhow::{Result, anyhow};
 use clap::{ArgAction, CommandFactory, Parser};
+use mte_slam_core::settings::edit_distance;
 use std::path::Path;
 use toml::{Table, Value};
 

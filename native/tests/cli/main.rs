@@ -13,3 +13,4 @@ mod python;
 mod refusals;
 mod resume;
 mod serve;
+mod settings;

@@ -1,5 +1,5 @@
 // The form of the start: a choice of recording and settings, and back.
-import type { Settings } from "../client";
+import type { Overrides, Settings } from "../client";
 import { element, show } from "./dom";
 import type { Choice } from "./state";
 
@@ -20,12 +20,13 @@ export function choiceFromForm(last: Choice): Choice {
     const n = input<HTMLInputElement>(id).valueAsNumber;
     return Number.isFinite(n) ? n : undefined;
   };
-  const settings: Settings = { ...last.settings, preset: input<HTMLSelectElement>("preset").value };
+  const preset = input<HTMLSelectElement>("preset").value as Settings["preset"];
+  const settings: Settings = { ...last.settings, preset };
   const engine = input<HTMLSelectElement>("engine-choice").value;
   settings.engine = engine as Settings["engine"];
   settings.labels = input<HTMLSelectElement>("labels").value as Settings["labels"];
   const tracker = input<HTMLSelectElement>("tracker").value;
-  if (tracker) settings.tracker = tracker;
+  if (tracker) settings.tracker = tracker as Settings["tracker"];
   else delete settings.tracker;
   const frames = number("frames");
   if (frames === undefined) delete settings.frames;
@@ -34,8 +35,9 @@ export function choiceFromForm(last: Choice): Choice {
   settings.scale = number("scale") ?? 1;
   settings.liveResolutionM = (number("resolution") ?? 5) / 100;
   for (const box of element("switches").querySelectorAll<HTMLInputElement>("input")) {
-    if (box.checked === box.defaultChecked && settings.overrides?.[box.dataset.path!] === undefined) continue;
-    settings.overrides = { ...settings.overrides, [box.dataset.path!]: box.checked };
+    const path = box.dataset.path as keyof Overrides;
+    if (box.checked === box.defaultChecked && settings.overrides?.[path] === undefined) continue;
+    settings.overrides = { ...settings.overrides, [path]: box.checked } as Overrides;
   }
   const source = chosen() === "url" ? input<HTMLInputElement>("url").value.trim() : chosen();
   return { source, settings, width: last.width, auto: false };

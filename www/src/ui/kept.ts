@@ -68,6 +68,6 @@ export async function offer(goOn: (run: KeptRun) => void): Promise<void> {
 }
 
 /** Settings that a run takes over from today's page when it goes on. */
-export function engineOf({ engine, unroll }: Settings): Settings {
-  return { ...(engine && { engine }), ...(unroll !== undefined && { unroll }) };
+export function engineOf({ engine }: Settings): Settings {
+  return { ...(engine && { engine }) };
 }

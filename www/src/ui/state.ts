@@ -1,6 +1,6 @@
 // What of a run is in the address, so that it can be shared and survives a reload:
 // ?source=room&preset=fast&engine=auto&frames=60
-import type { Settings, SourceSpec } from "../client";
+import type { Overrides, Settings, SourceSpec } from "../client";
 import { address } from "./sources";
 
 export interface Choice {
@@ -17,15 +17,25 @@ const number = (text: string | null): number | undefined => {
   return Number.isFinite(n) ? n : undefined;
 };
 
+/** A number, `true`, `false` or a list as such; anything else is a text. */
+function literal(text: string): unknown {
+  try {
+    return JSON.parse(text);
+  } catch {
+    return text;
+  }
+}
+
 export function read(query: URLSearchParams): Choice {
   const settings: Settings = {};
   const preset = query.get("preset");
   const engine = query.get("engine");
-  if (preset) settings.preset = preset;
+  // What an address says is checked where it is used.
+  if (preset) settings.preset = preset as Settings["preset"];
   if (engine === "auto" || engine === "gpu" || engine === "cpu") settings.engine = engine;
   if (query.get("labels") === "none") settings.labels = "none";
   const tracker = query.get("tracker");
-  if (tracker) settings.tracker = tracker;
+  if (tracker) settings.tracker = tracker as Settings["tracker"];
   const frames = number(query.get("frames"));
   if (frames !== undefined) settings.frames = frames;
   const stride = number(query.get("stride"));
@@ -36,12 +46,12 @@ export function read(query: URLSearchParams): Choice {
   if (resolution !== undefined) settings.liveResolutionM = resolution / 100;
   const renderEvery = number(query.get("render"));
   if (renderEvery !== undefined) settings.renderEvery = renderEvery;
-  const overrides: Record<string, number | string | boolean> = {};
+  const overrides: Record<string, unknown> = {};
   for (const [key, value] of query) {
     if (!key.startsWith("set.")) continue;
-    overrides[key.slice(4)] = value === "true" ? true : value === "false" ? false : (number(value) ?? value);
+    overrides[key.slice(4)] = literal(value);
   }
-  if (Object.keys(overrides).length > 0) settings.overrides = overrides;
+  if (Object.keys(overrides).length > 0) settings.overrides = overrides as Overrides;
   return { source: query.get("source") ?? "", settings, width: number(query.get("width")) ?? 160, auto: query.has("auto") };
 }
 
@@ -62,7 +72,7 @@ export function write(choice: Choice): string {
   put("mesh", s.liveResolutionM === undefined ? undefined : Math.round(s.liveResolutionM * 1e4) / 100, 5);
   put("render", s.renderEvery, 5);
   put("width", choice.width, 160);
-  for (const [key, value] of Object.entries(s.overrides ?? {})) query.set(`set.${key}`, String(value));
+  for (const [key, value] of Object.entries(s.overrides ?? {})) query.set(`set.${key}`, typeof value === "string" ? value : JSON.stringify(value));
   return query.toString();
 }
 

@@ -1,6 +1,6 @@
-//! Turning a checked recording into submissions.
+//! Turning checked commands into submissions.
 use super::{EngineError, GpuEngine, UNIFORM_BYTES, address};
-use crate::recording::{Command, Recording};
+use crate::commands::{Command, Commands};
 use alloc::vec::Vec;
 use wgpu::util::DeviceExt as _;
 
@@ -66,12 +66,12 @@ impl Batch {
 
 impl GpuEngine {
     /// Encodes and submits; pipelines and bind groups exist already.
-    pub(super) fn encode(&self, recording: &Recording) -> Result<(), EngineError> {
+    pub(super) fn encode(&self, commands: &Commands) -> Result<(), EngineError> {
         let mut batch = Batch::new(&self.device);
         let buffer = |id, operation: &str| {
             self.buffers.get(id, || operation.into()).map(|entry| &entry.data)
         };
-        for command in &recording.commands {
+        for command in &commands.list {
             match *command {
                 Command::Upload { buffer: id, offset_words, ref data } => {
                     let (target, offset) = (buffer(id, "upload")?, 4 * offset_words as u64);

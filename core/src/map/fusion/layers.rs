@@ -1,5 +1,6 @@
 //! Layers of the fusion, and which of them one dispatch runs side by side.
 use crate::{
+    commands::{Buffer, Commands, workgroups_1d},
     config::FusionConfig,
     engine::{Engine, EngineError},
     kernels::{
@@ -11,7 +12,6 @@ use crate::{
             TokenLayer,
         },
     },
-    recording::{BufferId, Recording, workgroups_1d},
 };
 use alloc::{vec, vec::Vec};
 
@@ -147,14 +147,14 @@ impl Group {
     /// Workgroups for as many invocations as the layer with most has.
     pub fn workgroups(&self, invocations: impl Fn(&TokenLayer) -> usize) -> [u32; 3] {
         let most = self.layers.iter().map(invocations).max().unwrap_or(0);
-        let [x, y, _] = workgroups_1d(most, TOKEN_LAYER.workgroup_size);
+        let [x, y, _] = workgroups_1d(most, TOKEN_LAYER.interface.workgroup_size);
         [x, y, self.layers.len() as u32]
     }
 }
 
 /// The dispatches of layers, and the table they find them in.
 pub(super) struct Schedule {
-    pub table: BufferId,
+    pub table: Buffer<TokenLayer>,
     /// As [`FORWARD`].
     pub forward: Vec<Step<Group>>,
     /// As [`BACKWARD`].
@@ -209,8 +209,8 @@ impl Schedule {
             ..TokenLayer::default()
         }]);
         let words: &[u32] = bytemuck::cast_slice(&table);
-        let buffer = e.create_buffer("token layers", words.len())?;
-        let mut r = Recording::default();
+        let buffer = e.create("token layers", words.len())?;
+        let mut r = Commands::default();
         r.upload(buffer, 0, words);
         e.submit(&r)?;
         Ok(Schedule { table: buffer, forward, backward, weights, features, head })

@@ -8,16 +8,17 @@ pub use passes::{record_backward, record_forward, record_step};
 
 use super::{ParameterTensor, TokenGrid};
 use crate::{
+    commands::{Buffer, Commands},
     config::FusionConfig,
     engine::{Engine, EngineError},
     kernels::{
         shared::random_f32,
         tokens::{LOGITS_AT, NO_BIAS, RAW_HISTOGRAM},
     },
-    recording::{BufferId, Recording},
 };
 use alloc::{vec, vec::Vec};
 use layers::{Schedule, layers};
+use mte_slam_shaders::random::{first_values, salt};
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
@@ -48,12 +49,12 @@ pub struct Fusion {
 /// Activations and gradients of the last frame that went through the fusion.
 pub struct FusionScratch {
     /// Activations.
-    pub tokens: BufferId,
+    pub tokens: Buffer<f32>,
     /// Gradients of the last training pass.
-    pub token_gradient: BufferId,
-    raw: BufferId,
-    partials: BufferId,
-    head_partials: BufferId,
+    pub token_gradient: Buffer<f32>,
+    raw: Buffer<f32>,
+    partials: Buffer<f32>,
+    head_partials: Buffer<f32>,
 }
 
 impl FusionScratch {
@@ -66,11 +67,11 @@ impl FusionScratch {
         let (stride, raw_stride) = (fusion.stride as usize, fusion.raw_stride as usize);
         let partials = CHUNKS as usize * fusion.parameters.floats;
         Ok(FusionScratch {
-            tokens: e.create_buffer("tokens", tokens * stride)?,
-            token_gradient: e.create_buffer("token gradients", tokens * stride)?,
-            raw: e.create_buffer("raw tokens", tokens * raw_stride)?,
-            partials: e.create_buffer("fusion partials", partials)?,
-            head_partials: e.create_buffer("head partials", (CHUNKS * classes * 17) as usize)?,
+            tokens: e.create("tokens", tokens * stride)?,
+            token_gradient: e.create("token gradients", tokens * stride)?,
+            raw: e.create("raw tokens", tokens * raw_stride)?,
+            partials: e.create("fusion partials", partials)?,
+            head_partials: e.create("head partials", (CHUNKS * classes * 17) as usize)?,
         })
     }
 }
@@ -115,11 +116,13 @@ impl Fusion {
                 let unused =
                     l.input_stride > l.outputs && (i - l.weights) % l.input_stride >= l.outputs;
                 if !unused {
-                    w[i as usize] = (2.0 * random_f32(seed, 0x1720, i, 9) - 1.0) * limit;
+                    w[i as usize] = (2.0 * random_f32(seed, first_values::FUSION, i, salt::FUSION)
+                        - 1.0)
+                        * limit;
                 }
             }
         }
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         r.upload(fusion.parameters.values, 0, &w);
         e.submit(&r)?;
         Ok(fusion)

@@ -4,19 +4,13 @@ use super::{
     layers::{Group, Step},
 };
 use crate::{
+    call::Call,
+    commands::{Buffer, Commands},
     kernels::{
-        attend_keys::ATTEND_KEYS,
-        attend_queries::ATTEND_QUERIES,
-        attend_tokens::ATTEND_TOKENS,
-        extract_tokens::EXTRACT_TOKENS,
-        gate_backward::GATE_BACKWARD,
-        gate_tokens::GATE_TOKENS,
-        recall_tokens::RECALL_TOKENS,
-        reduce_partials::{REDUCE_PARTIALS, ReducePartialsParams},
-        token_layer::TOKEN_LAYER,
-        token_layer_backward::TOKEN_LAYER_BACKWARD,
-        token_loss::TOKEN_LOSS,
-        token_weights::TOKEN_WEIGHTS,
+        attend_keys, attend_queries, attend_tokens, extract_tokens, gate_backward, gate_tokens,
+        recall_tokens,
+        reduce_partials::{self, ReducePartialsParams},
+        token_layer, token_layer_backward, token_loss, token_weights,
         tokens::{
             APPEARANCE_AT, FIRST_AT, GUIDED_AT, NO_RESIDUAL, REFINED_AT, SECOND_AT, STATISTICS_AT,
             TILE, TokenParams,
@@ -24,29 +18,33 @@ use crate::{
     },
     layout::{FieldParams, HEAD_FLOATS},
     map::{Map, Scratch, parameters::AdamStep},
-    recording::{BufferId, Recording},
 };
 
 /// Fused features of a stored frame; they become the targets of its rays. Records nothing without a
 /// fusion, as all passes here.
-pub fn record_forward(r: &mut Recording, map: &Map, scratch: &Scratch, slot: u32) {
+pub fn record_forward(r: &mut Commands, map: &Map, scratch: &Scratch, slot: u32) {
     record_tokens(r, map, scratch, slot, false);
 }
 
 /// Forward pass, losses and gradients of the fusion on a stored frame; nothing moves yet.
-pub fn record_backward(r: &mut Recording, map: &Map, scratch: &Scratch, slot: u32) {
+pub fn record_backward(r: &mut Commands, map: &Map, scratch: &Scratch, slot: u32) {
     let (Some(f), Some(s)) = (&map.fusion, &scratch.fusion) else { return };
     let p = token_params(map, f, slot);
     let n = f.count();
     r.clear(s.token_gradient, 0, n * f.stride as usize);
     record_tokens(r, map, scratch, slot, true);
-    r.dispatch_1d(&GATE_BACKWARD, &p, &[s.tokens, s.token_gradient], n);
+    gate_backward::Buffers { tokens: s.tokens, token_gradient: s.token_gradient }.record(r, &p, n);
     for step in &f.schedule.backward {
         match step {
-            Step::Layers(group) => r.dispatch(
-                &TOKEN_LAYER_BACKWARD,
+            Step::Layers(group) => token_layer_backward::Buffers {
+                layers: f.schedule.table,
+                parameters: f.parameters.values.floats(),
+                tokens: s.tokens,
+                token_gradient: s.token_gradient,
+            }
+            .record_workgroups(
+                r,
                 &TokenParams { layer: group.first, ..p },
-                &[f.schedule.table, f.parameters.values, s.tokens, s.token_gradient],
                 group.workgroups(|l| n * l.inputs as usize),
             ),
             Step::FirstAttention => record_attention_backward(r, f, s, &first(p)),
@@ -59,24 +57,24 @@ pub fn record_backward(r: &mut Recording, map: &Map, scratch: &Scratch, slot: u3
     }
     let chunks = (n as u32).div_ceil(p.chunk);
     let floats = f.parameters.floats as u32;
-    r.dispatch_1d(
-        &REDUCE_PARTIALS,
-        &ReducePartialsParams { rows: chunks, columns: floats, row: floats, offset: 0 },
-        &[s.partials, f.parameters.gradient],
-        floats as usize,
-    );
+    reduce_partials::Buffers { partials: s.partials, gradient: f.parameters.gradient.cast() }
+        .record(
+            r,
+            &ReducePartialsParams { rows: chunks, columns: floats, row: floats, offset: 0 },
+            floats as usize,
+        );
     let row = map.classes * 17;
     record_weights(r, f, s, &f.schedule.head, [s.raw, s.head_partials], TokenParams { row, ..p });
-    r.dispatch_1d(
-        &REDUCE_PARTIALS,
-        &ReducePartialsParams { rows: chunks, columns: row, row, offset: HEAD_FLOATS as u32 },
-        &[s.head_partials, map.decoders.gradient],
-        row as usize,
-    );
+    reduce_partials::Buffers { partials: s.head_partials, gradient: map.decoders.gradient.cast() }
+        .record(
+            r,
+            &ReducePartialsParams { rows: chunks, columns: row, row, offset: HEAD_FLOATS as u32 },
+            row as usize,
+        );
 }
 
 /// One training step of the fusion (and the class head) on a stored frame.
-pub fn record_step(r: &mut Recording, map: &mut Map, scratch: &Scratch, slot: u32, rate_head: f64) {
+pub fn record_step(r: &mut Commands, map: &mut Map, scratch: &Scratch, slot: u32, rate_head: f64) {
     record_backward(r, map, scratch, slot);
     let Some(f) = &mut map.fusion else { return };
     f.step += 1;
@@ -88,16 +86,25 @@ pub fn record_step(r: &mut Recording, map: &mut Map, scratch: &Scratch, slot: u3
     map.decoders.record_adam(r, map.status, step);
 }
 
-fn record_tokens(r: &mut Recording, map: &Map, scratch: &Scratch, slot: u32, train: bool) {
+fn record_tokens(r: &mut Commands, map: &Map, scratch: &Scratch, slot: u32, train: bool) {
     let (Some(f), Some(s)) = (&map.fusion, &scratch.fusion) else { return };
     let p = token_params(map, f, slot);
     let n = f.count();
-    let inputs = [map.frames.poses, map.frames.color_images, map.frames.depth_images, s.raw];
-    r.dispatch_1d(&EXTRACT_TOKENS, &p, &inputs, n);
+    extract_tokens::Buffers {
+        poses: map.frames.poses,
+        color_images: map.frames.color_images,
+        depth_images: map.frames.depth_images,
+        raw: s.raw,
+    }
+    .record(r, &p, n);
     if f.config.memory {
         let p = FieldParams { raw_stride: f.raw_stride, ..map.base };
-        let inputs = [map.semantic.values, map.decoders.values, s.raw];
-        r.dispatch_1d(&RECALL_TOKENS, &p, &inputs, n);
+        recall_tokens::Buffers {
+            planes_semantic: map.semantic.values,
+            decoders: map.decoders.values,
+            raw: s.raw,
+        }
+        .record(r, &p, n);
     }
     if let Some(group) = &f.schedule.features {
         record_layers(r, f, s, group, map.frames.feature_maps, feature_inputs(f, p));
@@ -109,22 +116,18 @@ fn record_tokens(r: &mut Recording, map: &Map, scratch: &Scratch, slot: u32, tra
             Step::SecondAttention => record_attention(r, f, s, &second(f, p)),
         }
     }
-    r.dispatch_1d(&GATE_TOKENS, &p, &[s.tokens], n);
+    gate_tokens::Buffers { tokens: s.tokens }.record(r, &p, n);
     let color_head = f.layers[f.layers.len() - 1].shape.weights;
-    r.dispatch_1d(
-        &TOKEN_LOSS,
-        &TokenParams { train: u32::from(train), color_head, ..p },
-        &[
-            f.parameters.values,
-            map.decoders.values,
-            map.token_class_weights,
-            s.raw,
-            s.tokens,
-            s.token_gradient,
-            map.frames.targets,
-        ],
-        n,
-    );
+    token_loss::Buffers {
+        parameters: f.parameters.values.floats(),
+        decoders: map.decoders.values.floats(),
+        class_weights: map.token_class_weights,
+        raw: s.raw,
+        tokens: s.tokens,
+        token_gradient: s.token_gradient,
+        targets: map.frames.targets,
+    }
+    .record(r, &TokenParams { train: u32::from(train), color_head, ..p }, n);
 }
 
 /// The feature maps as raw inputs.
@@ -134,36 +137,47 @@ fn feature_inputs(f: &Fusion, p: TokenParams) -> TokenParams {
 }
 
 fn record_layers(
-    r: &mut Recording,
+    r: &mut Commands,
     f: &Fusion,
     s: &FusionScratch,
     group: &Group,
-    raw: BufferId,
+    raw: Buffer<f32>,
     p: TokenParams,
 ) {
     let n = f.count();
-    r.dispatch(
-        &TOKEN_LAYER,
+    token_layer::Buffers {
+        layers: f.schedule.table,
+        parameters: f.parameters.values.floats(),
+        raw,
+        tokens: s.tokens,
+    }
+    .record_workgroups(
+        r,
         &TokenParams { layer: group.first, ..p },
-        &[f.schedule.table, f.parameters.values, raw, s.tokens],
         group.workgroups(|l| n * l.quads()),
     );
 }
 
 fn record_weights(
-    r: &mut Recording,
+    r: &mut Commands,
     f: &Fusion,
     s: &FusionScratch,
     group: &Group,
-    buffers: [BufferId; 2],
+    buffers: [Buffer<f32>; 2],
     p: TokenParams,
 ) {
     let [raw, partials] = buffers;
     let chunks = f.count().div_ceil(p.chunk as usize);
-    r.dispatch(
-        &TOKEN_WEIGHTS,
+    token_weights::Buffers {
+        layers: f.schedule.table,
+        raw,
+        tokens: s.tokens,
+        token_gradient: s.token_gradient,
+        partials,
+    }
+    .record_workgroups(
+        r,
         &TokenParams { layer: group.first, ..p },
-        &[f.schedule.table, raw, s.tokens, s.token_gradient, partials],
         group.workgroups(|l| l.weight_jobs() * chunks),
     );
 }
@@ -213,12 +227,20 @@ fn second(f: &Fusion, p: TokenParams) -> TokenParams {
     }
 }
 
-fn record_attention(r: &mut Recording, f: &Fusion, s: &FusionScratch, p: &TokenParams) {
-    r.dispatch(&ATTEND_TOKENS, p, &[s.tokens], [f.count().div_ceil(TILE) as u32, 1, 1]);
+fn record_attention(r: &mut Commands, f: &Fusion, s: &FusionScratch, p: &TokenParams) {
+    attend_tokens::Buffers { tokens: s.tokens }.record_workgroups(
+        r,
+        p,
+        [f.count().div_ceil(TILE) as u32, 1, 1],
+    );
 }
 
-fn record_attention_backward(r: &mut Recording, f: &Fusion, s: &FusionScratch, p: &TokenParams) {
-    let buffers = [s.tokens, s.token_gradient];
-    r.dispatch(&ATTEND_QUERIES, p, &buffers, [f.count().div_ceil(TILE) as u32, 1, 1]);
-    r.dispatch(&ATTEND_KEYS, p, &buffers, [p.keys().div_ceil(TILE) as u32, 1, 1]);
+fn record_attention_backward(r: &mut Commands, f: &Fusion, s: &FusionScratch, p: &TokenParams) {
+    attend_queries::Buffers { tokens: s.tokens, token_gradient: s.token_gradient }
+        .record_workgroups(r, p, [f.count().div_ceil(TILE) as u32, 1, 1]);
+    attend_keys::Buffers { tokens: s.tokens, token_gradient: s.token_gradient }.record_workgroups(
+        r,
+        p,
+        [p.keys().div_ceil(TILE) as u32, 1, 1],
+    );
 }

@@ -1,19 +1,20 @@
 //! The field at given points: distances, surfaces, and normal equations of a pose.
 use crate::{
+    call::Call,
+    commands::Commands,
     engine::{Engine, EngineError},
     kernels::{
-        align_points::{ALIGN_POINTS, ALIGN_ROW},
-        query_points::QUERY_POINTS,
+        align_points::{self, ALIGN_ROW},
+        query_points,
         shared::{FLAG_ANCHORS, FLAG_MAP},
     },
     map::{Map, QUERY_POINTS_MAX, Scratch, sample_head},
     pose::Pose,
-    recording::Recording,
 };
 use alloc::vec::Vec;
 
 /// Uploads camera-frame points (x, y, z \[m\], intensity) for [`align`].
-pub fn upload_pixels(r: &mut Recording, scratch: &Scratch, pixels: &[[f32; 4]]) {
+pub fn upload_pixels(r: &mut Commands, scratch: &Scratch, pixels: &[[f32; 4]]) {
     r.upload(scratch.points, 0, pixels);
 }
 
@@ -28,23 +29,19 @@ pub async fn align(
     pose: &Pose,
     count: u32,
 ) -> Result<[f64; ALIGN_ROW], EngineError> {
-    let mut r = Recording::default();
+    let mut r = Commands::default();
     map.frames.upload_pose(&mut r, 0, pose);
     let mut p = map.base;
     p.rays = count;
-    r.dispatch_1d(
-        &ALIGN_POINTS,
-        &p,
-        &[
-            map.frames.poses,
-            scratch.points,
-            map.geometry.values,
-            map.appearance.values,
-            map.decoders.values,
-            scratch.values,
-        ],
-        count as usize,
-    );
+    align_points::Buffers {
+        poses: map.frames.poses,
+        pixels: scratch.points,
+        planes_geometry: map.geometry.values,
+        planes_appearance: map.appearance.values,
+        decoders: map.decoders.values,
+        partials: scratch.values,
+    }
+    .record(&mut r, &p, count as usize);
     engine.submit(&r)?;
     let groups = count.div_ceil(64) as usize;
     let rows: Vec<f32> = engine.read_as(scratch.values, 0, groups * ALIGN_ROW).await?;
@@ -103,27 +100,23 @@ async fn query(
     let floats = if flags & FLAG_MAP == 0 { 1 } else { 8 };
     let mut out = Vec::with_capacity(points.len() * floats);
     for chunk in points.chunks(QUERY_POINTS_MAX) {
-        let mut r = Recording::default();
+        let mut r = Commands::default();
         r.upload(scratch.points, 0, chunk);
         let mut p = map.base;
         p.rays = chunk.len() as u32;
         p.flags = flags;
         p.classes = map.ray_classes();
         p.anchors = map.anchor_slots();
-        r.dispatch_1d(
-            &QUERY_POINTS,
-            &p,
-            &[
-                scratch.points,
-                map.geometry.values,
-                map.appearance.values,
-                map.semantic.values,
-                map.decoders.values,
-                map.anchors(),
-                scratch.values,
-            ],
-            chunk.len(),
-        );
+        query_points::Buffers {
+            points: scratch.points,
+            planes_geometry: map.geometry.values,
+            planes_appearance: map.appearance.values,
+            planes_semantic: map.semantic.values,
+            decoders: map.decoders.values,
+            anchors: map.anchors(),
+            values: scratch.values,
+        }
+        .record(&mut r, &p, chunk.len());
         engine.submit(&r)?;
         out.extend(engine.read_as::<f32>(scratch.values, 0, chunk.len() * floats).await?);
     }

@@ -1,14 +1,16 @@
 //! Adam's steps of map and poses, with the decoders' gradients that they need.
 use crate::{
+    call::Call,
+    commands::Commands,
     kernels::{
-        pose_step::{POSE_STEP, PoseStepParams},
-        reduce_partials::{REDUCE_PARTIALS, ReducePartialsParams},
-        weight_gradient::{WEIGHT_GRADIENT, WeightGradientParams},
+        pose_step::{self, PoseStepParams},
+        reduce_partials::{self, ReducePartialsParams},
+        weight_gradient::{self, WeightGradientParams},
     },
     layout::{
-        GEOMETRY_FLOATS, STATE_APPEARANCE, STATE_COLOR_DELTA, STATE_COLOR_HIDDEN,
-        STATE_COLOR_HIDDEN_DELTA, STATE_FEATURE, STATE_FEATURE_DELTA, STATE_SEMANTIC,
-        STATE_SEMANTIC_HIDDEN, STATE_SEMANTIC_HIDDEN_DELTA,
+        FEATURE, GEOMETRY_FLOATS, HEAD_FLOATS, STATE_APPEARANCE, STATE_COLOR_DELTA,
+        STATE_COLOR_HIDDEN, STATE_COLOR_HIDDEN_DELTA, STATE_FEATURE, STATE_FEATURE_DELTA,
+        STATE_SEMANTIC, STATE_SEMANTIC_HIDDEN, STATE_SEMANTIC_HIDDEN_DELTA,
     },
     map::{
         Batch, Map, ParameterTensor, Rates, Scratch,
@@ -16,13 +18,13 @@ use crate::{
         sample_head,
         scratch::{DECODER_CHUNK, GEOMETRY_ROWS},
     },
-    recording::Recording,
 };
 use alloc::vec;
+use mte_slam_shaders::decoders::{COLOR, Layer, SEMANTIC};
 
 /// One Adam step of the window's poses from the last backward pass.
 pub fn record_pose_step(
-    r: &mut Recording,
+    r: &mut Commands,
     map: &Map,
     scratch: &Scratch,
     b: &Batch<'_>,
@@ -38,37 +40,36 @@ pub fn record_pose_step(
         weight_color: b.loss.color as f32,
         weight_depth: b.loss.depth as f32,
     };
-    r.dispatch(
-        &POSE_STEP,
-        &p,
-        &[
-            scratch.ray_state,
-            scratch.ray_out,
-            scratch.window,
-            map.frames.poses,
-            map.frames.pose_state,
-        ],
-        [b.frames, 1, 1],
-    );
+    pose_step::Buffers {
+        ray_state: scratch.ray_state,
+        ray_out: scratch.ray_out,
+        window: scratch.window,
+        poses: map.frames.poses,
+        pose_state: map.frames.pose_state,
+    }
+    .record_workgroups(r, &p, [b.frames, 1, 1]);
 }
 
 /// Decoder gradients from the last backward pass, then Adam on everything.
 pub fn record_step(
-    r: &mut Recording,
+    r: &mut Commands,
     map: &mut Map,
     scratch: &Scratch,
     b: &Batch<'_>,
     rates: Rates,
 ) {
-    r.dispatch_1d(
-        &REDUCE_PARTIALS,
+    reduce_partials::Buffers {
+        partials: scratch.geometry_partials.floats(),
+        gradient: map.decoders.gradient.cast(),
+    }
+    .record(
+        r,
         &ReducePartialsParams {
             rows: GEOMETRY_ROWS,
             columns: GEOMETRY_FLOATS as u32,
             row: GEOMETRY_FLOATS as u32,
             offset: 0,
         },
-        &[scratch.geometry_partials, map.decoders.gradient],
         GEOMETRY_FLOATS,
     );
     record_updates(r, map, scratch, b, rates, true);
@@ -77,7 +78,7 @@ pub fn record_step(
 /// As [`record_step`], of the semantic planes, their decoder and the class head. The
 /// batch's weight of colour must be 0.
 pub fn record_semantic_step(
-    r: &mut Recording,
+    r: &mut Commands,
     map: &mut Map,
     scratch: &Scratch,
     b: &Batch<'_>,
@@ -87,7 +88,7 @@ pub fn record_semantic_step(
 }
 
 fn record_updates(
-    r: &mut Recording,
+    r: &mut Commands,
     map: &mut Map,
     scratch: &Scratch,
     b: &Batch<'_>,
@@ -98,20 +99,32 @@ fn record_updates(
     let floats = map.decoders.floats;
     let row = (floats - GEOMETRY_FLOATS) as u32;
     let chunks = p.rays.div_ceil(DECODER_CHUNK);
-    // (inputs, outputs, activations, deltas, weights, bias)
+    // Layers with their activations and deltas in a ray's state.
     let mut layers = vec![
-        (32, 32, STATE_APPEARANCE, STATE_COLOR_HIDDEN_DELTA, 0, 1024),
-        (32, 4, STATE_COLOR_HIDDEN, STATE_COLOR_DELTA, 1056, 1184),
+        (COLOR[0], STATE_APPEARANCE, STATE_COLOR_HIDDEN_DELTA),
+        (COLOR[1], STATE_COLOR_HIDDEN, STATE_COLOR_DELTA),
     ];
     if map.ray_classes() > 0 {
-        layers.push((32, 32, STATE_SEMANTIC, STATE_SEMANTIC_HIDDEN_DELTA, 1188, 2212));
-        layers.push((32, 16, STATE_SEMANTIC_HIDDEN, STATE_FEATURE_DELTA, 2244, 2756));
-        layers.push((16, map.classes, STATE_FEATURE, 0, 2772, 2772 + map.classes * 16));
+        let head = Layer {
+            inputs: FEATURE,
+            outputs: map.classes as usize,
+            weights: HEAD_FLOATS,
+            bias: HEAD_FLOATS + FEATURE * map.classes as usize,
+        };
+        layers.push((SEMANTIC[0], STATE_SEMANTIC, STATE_SEMANTIC_HIDDEN_DELTA));
+        layers.push((SEMANTIC[1], STATE_SEMANTIC_HIDDEN, STATE_FEATURE_DELTA));
+        layers.push((head, STATE_FEATURE, 0));
     }
-    for (i, (inputs, outputs, x, d, weight_offset, bias_offset)) in layers.into_iter().enumerate() {
-        let head = i == 4;
-        r.dispatch_1d(
-            &WEIGHT_GRADIENT,
+    for (layer, x, d) in layers {
+        let head = layer.weights == HEAD_FLOATS;
+        let (inputs, outputs) = (layer.inputs as u32, layer.outputs as u32);
+        weight_gradient::Buffers {
+            ray_state: scratch.ray_state.floats(),
+            logits_gradient: scratch.logits_gradient,
+            partials: scratch.decoder_partials,
+        }
+        .record(
+            r,
             &WeightGradientParams {
                 rays: p.rays,
                 inputs,
@@ -121,19 +134,21 @@ fn record_updates(
                 delta_offset: d * 4,
                 from_logits: u32::from(head),
                 row,
-                weight_offset,
-                bias_offset,
+                weight_offset: (layer.weights - GEOMETRY_FLOATS) as u32,
+                bias_offset: (layer.bias - GEOMETRY_FLOATS) as u32,
                 input_stride: if head { 1 } else { outputs },
                 output_stride: if head { 16 } else { 1 },
             },
-            &[scratch.ray_state, scratch.logits_gradient, scratch.decoder_partials],
             (chunks * (inputs + 1) * outputs.div_ceil(4)) as usize,
         );
     }
-    r.dispatch_1d(
-        &REDUCE_PARTIALS,
+    reduce_partials::Buffers {
+        partials: scratch.decoder_partials,
+        gradient: map.decoders.gradient.cast(),
+    }
+    .record(
+        r,
         &ReducePartialsParams { rows: chunks, columns: row, row, offset: GEOMETRY_FLOATS as u32 },
-        &[scratch.decoder_partials, map.decoders.gradient],
         row as usize,
     );
     map.step += 1;

@@ -1,11 +1,11 @@
 //! Feature maps in NumPy's format.
-use super::Place;
+use super::place::Place;
 use mte_slam_types::{frame::FeatureMap, sequence::SequenceError};
 
 /// Longest header: it describes one array \[bytes\].
 const MAX_HEADER_BYTES: usize = 65535;
 
-/// A NumPy file (versions 1 to 3) of float32 or float16, little endian, C order, C x h x w.
+/// Reads a NumPy file (versions 1 to 3) of float32 or float16, little endian, C order, C x h x w.
 pub(super) fn parse(bytes: &[u8], at: Place<'_>) -> Result<FeatureMap, SequenceError> {
     let wrong = |field: &str, found: String, expected: &str| at.wrong(field, found, expected);
     let Some(rest) = bytes.strip_prefix(b"\x93NUMPY") else {

@@ -1,5 +1,5 @@
 //! Feature maps in the safetensors format.
-use super::Place;
+use super::place::Place;
 use crate::folder::shortened;
 use mte_slam_types::{frame::FeatureMap, safetensors, sequence::SequenceError};
 
@@ -10,7 +10,7 @@ const MAX_HEADER_BYTES: usize = 1 << 20;
 /// Name of the tensor that is meant where a file has several.
 const NAME: &str = "features";
 
-/// The tensor `features`, or the only one: F32 or F16, C x h x w.
+/// Reads the tensor `features`, or the only one: F32 or F16, C x h x w.
 pub(super) fn parse(bytes: &[u8], at: Place<'_>) -> Result<FeatureMap, SequenceError> {
     let tensors = match safetensors::parse(bytes, MAX_HEADER_BYTES) {
         Ok(file) => file.tensors,

@@ -1,6 +1,6 @@
 use super::*;
 
-/// A NumPy file as `numpy.save` writes it.
+/// Returns a NumPy file as `numpy.save` writes it.
 pub fn npy(dtype: &str, shape: &str, data: &[u8]) -> Vec<u8> {
     let mut header =
         format!("{{'descr': '{dtype}', 'fortran_order': False, 'shape': ({shape}), }}");
@@ -66,7 +66,7 @@ fn what_is_no_feature_map_is_named() {
     }
 }
 
-/// A safetensors file with this header.
+/// Returns a safetensors file with this header.
 pub fn tensors(header: &str, data: &[u8]) -> Vec<u8> {
     [&(header.len() as u64).to_le_bytes()[..], header.as_bytes(), data].concat()
 }

@@ -1,7 +1,10 @@
 //! Whether depth and poses fit each other: the depth of a frame, moved into a later one by their
 //! true poses, must be the depth that is measured there. A wrong unit of depth, other axes or
 //! another meaning of the poses make it worse, and the right one better, so all usual ones are tried.
-use super::{Severity, summary::median};
+use super::{
+    remark::Severity,
+    summary::{USUAL_UNITS, median},
+};
 use glam::DQuat;
 use mte_slam_types::{
     camera::Camera,
@@ -11,14 +14,11 @@ use mte_slam_types::{
 };
 use serde::Serialize;
 
-/// Units of depth per metre that are in use: millimetres, TUM, Replica, 0.1 mm, RealSense L515,
-/// KITTI.
-pub(super) const USUAL_UNITS: [f64; 6] = [1000.0, 5000.0, 6553.5, 10_000.0, 4000.0, 256.0];
 /// Points of a frame that are moved, about.
 const POINTS: usize = 2500;
 /// A later frame is far enough when depth at the same pixels differs by this share there.
 const CHANGE: f64 = 0.04;
-/// Below this nothing can be told.
+/// Below this nothing can be said.
 const LEAST_CHANGE: f64 = 0.012;
 /// How many frames later, at most.
 const OFFSETS: [usize; 9] = [1, 2, 3, 5, 8, 12, 20, 30, 45];
@@ -34,6 +34,7 @@ const SURFACE: f64 = 0.05;
 /// What the numbers of a pose are taken for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum PoseReading {
     /// As the reader takes them.
     AsGiven,
@@ -166,7 +167,7 @@ impl Pair {
         median(differences.collect())
     }
 
-    /// Depth between pixels \[units\], bilinear within a surface, else of the nearest pixel.
+    /// Returns depth between pixels \[units\], bilinear within a surface, else of the nearest pixel.
     fn depth_at(&self, width: usize, u: f64, v: f64) -> Option<f64> {
         let (x, y) = (u as usize, v as usize);
         let (a, b) = (u - x as f64, v - y as f64);
@@ -327,7 +328,7 @@ fn lexical_order(sequence: &dyn Sequence) -> Option<Vec<usize>> {
 }
 
 impl Agreement {
-    /// Whether an error is a clear improvement over the files as given, and not only as good as if
+    /// Returns whether an error is a clear improvement over the files as given, and not only as good as if
     /// the camera stood still (which any large depth comes near to).
     fn is_convincing(&self, error: f64) -> bool {
         self.error > GOOD && error < CONVINCING * self.error.min(self.error_without_motion)

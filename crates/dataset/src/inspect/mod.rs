@@ -1,9 +1,11 @@
 //! What a recording holds, and whether its parts fit each other: the usual mistakes of own
 //! recordings show in numbers that anybody can check.
 mod agreement;
+mod remark;
 mod summary;
 
 pub use agreement::{Agreement, PoseReading, Reading};
+pub use remark::{Remark, Severity};
 pub use summary::{ClassShare, DepthSummary, Gap, Jump, LabelSummary, OrderSummary, PoseSummary};
 
 use mte_slam_types::{
@@ -25,25 +27,6 @@ impl Default for InspectOptions {
     fn default() -> Self {
         Self { frames: 40, pairs: 12 }
     }
-}
-
-/// How bad a remark is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Severity {
-    /// Good to know.
-    Note,
-    /// Results will be wrong unless this is meant.
-    Warning,
-}
-
-/// Something about the recording that people should know.
-#[derive(Clone, Debug, Serialize)]
-pub struct Remark {
-    /// How bad.
-    pub severity: Severity,
-    /// The evidence, and what to do.
-    pub text: String,
 }
 
 /// What a recording holds.
@@ -74,7 +57,7 @@ pub struct Inspection {
 }
 
 impl Inspection {
-    /// Whether there is any warning.
+    /// Returns whether there is any warning.
     pub fn has_warnings(&self) -> bool {
         self.remarks.iter().any(|r| r.severity == Severity::Warning)
     }

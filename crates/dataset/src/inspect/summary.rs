@@ -1,5 +1,5 @@
 //! Counts and ranges.
-use super::Severity;
+use super::remark::Severity;
 use mte_slam_types::{
     classes::UNLABELLED,
     frame::{Frame, SequenceInfo},
@@ -7,6 +7,9 @@ use mte_slam_types::{
 };
 use serde::Serialize;
 
+/// Units of depth per metre that are in use: millimetres, TUM, Replica, 0.1 mm, RealSense L515,
+/// KITTI.
+pub(super) const USUAL_UNITS: [f64; 6] = [1000.0, 5000.0, 6553.5, 10_000.0, 4000.0, 256.0];
 /// Gaps that are listed one by one.
 const LISTED: usize = 5;
 
@@ -193,7 +196,7 @@ impl DepthSummary {
         let units = 1.0 / info.depth_unit_m;
         let (low, median) = (self.percentile_1_m, self.median_m);
         if median > 0.0 && !(0.15..=15.0).contains(&median) {
-            let fits: Vec<String> = super::agreement::USUAL_UNITS
+            let fits: Vec<String> = USUAL_UNITS
                 .into_iter()
                 .filter(|u| (0.5..=6.0).contains(&(median * units / u)))
                 .map(|u| format!("{:.2} m with --depth-scale {u}", median * units / u))
@@ -328,7 +331,7 @@ fn listed(gaps: &[Gap]) -> String {
     shown.join(", ") + &more
 }
 
-/// The median, 0 of nothing.
+/// Returns the median, 0 of nothing.
 pub(super) fn median(mut values: Vec<f64>) -> f64 {
     if values.is_empty() {
         return 0.0;

@@ -31,7 +31,7 @@ impl Spoiled {
         inspect(&mut self, InspectOptions::default(), |_, _| {}).unwrap()
     }
 
-    /// The one warning.
+    /// Returns the one warning.
     fn warning(self) -> String {
         let found = self.inspect();
         let warnings: Vec<&Remark> =

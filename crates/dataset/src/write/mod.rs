@@ -40,6 +40,7 @@ impl ColorFormat {
 
 /// Why a frame could not be written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum WriteError {
     /// The sink refused a file.
     #[error("{file}: cannot be written: {source}")]
@@ -103,7 +104,7 @@ impl<F: FnMut(&str, &[u8]) -> std::io::Result<()>> Files<F> {
         Self { info: info.clone(), color, sink, void }
     }
 
-    /// Whether all images have the camera's size.
+    /// Returns whether all images have the camera's size.
     fn check(&self, frame: &Frame) -> Result<(), WriteError> {
         let pixels = self.info.camera.pixels();
         let check = |field, found, expected| match found == expected {
@@ -115,7 +116,7 @@ impl<F: FnMut(&str, &[u8]) -> std::io::Result<()>> Files<F> {
         check("label pixels", frame.labels.as_ref().map_or(pixels, Vec::len), pixels)
     }
 
-    /// The bytes of the colour image; `file` is for messages.
+    /// Returns the bytes of the colour image; `file` is for messages.
     fn color(&self, file: &str, color: &[[u8; 3]]) -> Result<Vec<u8>, WriteError> {
         let mut bytes = Vec::new();
         let kind = ExtendedColorType::Rgb8;

@@ -13,7 +13,7 @@ pub struct ReplicaWriter<F> {
 }
 
 impl<F: FnMut(&str, &[u8]) -> std::io::Result<()>> ReplicaWriter<F> {
-    /// A writer of frames of the given sequence.
+    /// Returns a writer of frames of the given sequence.
     pub fn new(info: &SequenceInfo, color: ColorFormat, sink: F) -> Self {
         Self { files: Files::new(info, color, sink), trajectory: String::new(), written: 0 }
     }

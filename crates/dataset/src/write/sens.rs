@@ -16,7 +16,7 @@ pub struct SensWriter<W, F> {
 }
 
 impl<W: Write, F: FnMut(&str, &[u8]) -> std::io::Result<()>> SensWriter<W, F> {
-    /// A writer of exactly as many frames as `info` says: their number stands at the front.
+    /// Returns a writer of exactly as many frames as `info` says: their number stands at the front.
     pub fn new(info: &SequenceInfo, color: ColorFormat, name: &str, stream: W, sink: F) -> Self {
         let files = Files::new(info, color, sink);
         Self { stream, files, name: name.into(), written: 0, begun: false }

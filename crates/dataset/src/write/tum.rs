@@ -19,7 +19,7 @@ pub struct TumWriter<F> {
 }
 
 impl<F: FnMut(&str, &[u8]) -> std::io::Result<()>> TumWriter<F> {
-    /// A writer of frames of the given sequence.
+    /// Returns a writer of frames of the given sequence.
     pub fn new(info: &SequenceInfo, color: ColorFormat, sink: F) -> Self {
         let lists = [
             "# colour images: stamp file\n".into(),
@@ -35,7 +35,7 @@ impl<F: FnMut(&str, &[u8]) -> std::io::Result<()>> TumWriter<F> {
         self.too_deep
     }
 
-    /// Depth in TUM's unit.
+    /// Returns depth in TUM's unit.
     fn depth(&mut self, depth: &[u16]) -> Vec<u16> {
         let ratio = self.files.info.depth_unit_m * UNITS;
         let mut out = Vec::with_capacity(depth.len());

@@ -17,7 +17,7 @@ fn room() -> (SequenceInfo, Vec<Frame>) {
     (room.info().clone(), (0..FRAMES).map(|i| room.frame(i).unwrap()).collect())
 }
 
-/// The files of one layout.
+/// Returns the files of one layout.
 pub fn recording(layout: Layout) -> MemorySource {
     let (info, frames) = room();
     let mut files = MemorySource::new("room");
@@ -103,7 +103,7 @@ fn all(mut writer: impl RecordingWriter, frames: &[Frame]) {
     assert_eq!(writer.finish().unwrap(), frames.len());
 }
 
-/// The files in a zip archive, below one folder.
+/// Returns the files in a zip archive, below one folder.
 pub fn archive(files: &MemorySource, method: zip::CompressionMethod) -> Vec<u8> {
     let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
     let options = zip::write::SimpleFileOptions::default().compression_method(method);

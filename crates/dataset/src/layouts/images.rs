@@ -1,0 +1,171 @@
+//! A plain folder of colour and depth images whose camera is given.
+use super::interface::{LayoutFiles, Mark, Parts};
+use crate::{
+    entries::{Entries, Entry, trajectory},
+    folder::{COLOR_ENDS, Folder, base, invalid, last_number, numbers, parse_matrix, plural},
+    intrinsics::{self, IMAGES_CAMERA, Intrinsics},
+};
+use mte_slam_types::{pose::Pose, sequence::SequenceError};
+use std::collections::{BTreeMap, BTreeSet};
+
+const COLOR_FOLDERS: [&str; 7] = ["color", "colour", "rgb", "image", "images", "left", "frames"];
+const DEPTH_FOLDERS: [&str; 2] = ["depth", "depths"];
+const POSE_FOLDERS: [&str; 2] = ["pose", "poses"];
+const POSE_FILES: [&str; 4] = ["traj.txt", "traj_w_c.txt", "poses.txt", "trajectory.txt"];
+
+pub(super) struct Images;
+
+impl LayoutFiles for Images {
+    fn name(&self) -> &'static str {
+        "images"
+    }
+
+    fn parts(&self) -> Parts {
+        Parts {
+            about: "",
+            color: "`color/`, `rgb/` or `images/`",
+            depth: "`depth/*.png`, mm unless the camera says",
+            poses: "`pose/0.txt`, `traj.txt`, `poses.txt`",
+            labels: "`semantic_class/`",
+        }
+    }
+
+    fn marks(&self, folder: &Folder, camera_given: bool) -> Vec<Mark> {
+        let camera = camera_given || folder.has(IMAGES_CAMERA);
+        vec![
+            ("color|rgb|images/<name>.jpg|png", colors(folder).len()),
+            ("depth/<name>.png", depths(folder).len()),
+            ("intrinsics.json (or a camera given)", camera.into()),
+        ]
+    }
+
+    fn read(&self, folder: &Folder, given: Option<&Intrinsics>) -> Result<Entries, SequenceError> {
+        read(folder, given.cloned())
+    }
+
+    /// Most recordings with a list or poses of their own are such folders, too.
+    fn is_last_resort(&self) -> bool {
+        true
+    }
+}
+
+/// Colour images, in the order of the numbers in their names.
+fn colors(folder: &Folder) -> Vec<&str> {
+    listed(folder, &COLOR_FOLDERS, &COLOR_ENDS)
+}
+
+/// Returns depth images, likewise.
+fn depths(folder: &Folder) -> Vec<&str> {
+    listed(folder, &DEPTH_FOLDERS, &[".png"])
+}
+
+/// The files of the first of some folders that has any.
+fn listed<'a>(folder: &'a Folder, folders: &[&str], ends: &[&str]) -> Vec<&'a str> {
+    for wanted in folders {
+        let mut files: Vec<&str> = folder
+            .names()
+            .filter(|n| {
+                n.split_once('/').is_some_and(|(top, base)| {
+                    top == *wanted && !base.contains('/') && ends.iter().any(|e| base.ends_with(e))
+                })
+            })
+            .collect();
+        if !files.is_empty() {
+            files.sort_by_key(|n| numbers(base(n)));
+            return files;
+        }
+    }
+    Vec::new()
+}
+
+/// Reads everything but the images.
+fn read(folder: &Folder, given: Option<Intrinsics>) -> Result<Entries, SequenceError> {
+    let mut warnings = Vec::new();
+    let pairs = paired(folder, &mut warnings)?;
+    let distinct: BTreeSet<u64> = pairs.iter().filter_map(|(c, _)| last_number(c)).collect();
+    let numbered = distinct.len() == pairs.len();
+    let mut frames: Vec<Entry> = pairs
+        .into_iter()
+        .enumerate()
+        .map(|(i, (color, depth))| {
+            let number = last_number(color).filter(|_| numbered).unwrap_or(i as u64);
+            Entry::of_files(number, color.into(), depth.into(), None)
+        })
+        .collect();
+    let numbers: Vec<u64> = frames.iter().map(|f| f.number).collect();
+    for (frame, truth) in frames.iter_mut().zip(poses(folder, &numbers)?) {
+        frame.truth = truth;
+    }
+    let intrinsics = match (given, intrinsics::read(folder)?) {
+        (Some(given), read) => {
+            Intrinsics { depth_scale: read.and_then(|r| r.depth_scale), ..given }
+        }
+        (None, Some(read)) => read,
+        (None, None) => {
+            let expected = "intrinsics.json, or the numbers on the command line";
+            return Err(invalid(&folder.name(), None, "camera", "nothing", expected));
+        }
+    };
+    Ok(Entries {
+        frames,
+        intrinsics,
+        depth_unit_m: 1e-3,
+        invalid_depth: None,
+        bounds: None,
+        warnings,
+    })
+}
+
+/// Colour and depth with the same numbers in their names, or else, where there are as many of
+/// both, in the same place of their orders.
+fn paired<'a>(
+    folder: &'a Folder,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<(&'a str, &'a str)>, SequenceError> {
+    let (colors, depths) = (colors(folder), depths(folder));
+    let keyed = |files: &[&'a str]| -> BTreeMap<Vec<u64>, &'a str> {
+        files.iter().map(|n| (numbers(base(n)), *n)).collect()
+    };
+    let (by_color, by_depth) = (keyed(&colors), keyed(&depths));
+    let pairs: Vec<(&str, &str)> =
+        by_color.iter().filter_map(|(k, c)| Some((*c, *by_depth.get(k)?))).collect();
+    // Names without distinct numbers cannot be told apart by them.
+    let distinct = by_color.len() == colors.len() && by_depth.len() == depths.len();
+    if distinct && !pairs.is_empty() {
+        let alone = colors.len() + depths.len() - 2 * pairs.len();
+        if alone > 0 {
+            warnings.push(format!("{} without its partner left out", plural(alone, "image")));
+        }
+        return Ok(pairs);
+    }
+    if colors.len() != depths.len() {
+        return Err(invalid(
+            &folder.name(),
+            None,
+            "images",
+            format!("{} colour and {} depth images", colors.len(), depths.len()),
+            "as many of both, or the same numbers in the names of both",
+        ));
+    }
+    warnings.push("colour and depth images are paired by their order".into());
+    Ok(colors.into_iter().zip(depths).collect())
+}
+
+/// Reads one file per frame in `pose/`, or one line per frame.
+fn poses(folder: &Folder, frames: &[u64]) -> Result<Vec<Option<Pose>>, SequenceError> {
+    for below in POSE_FOLDERS {
+        let files = folder.numbered(&format!("{below}/"), &[".txt"])?;
+        if files.is_empty() {
+            continue;
+        }
+        let one = |number: &u64| match files.get(number) {
+            Some(file) => parse_matrix(file, Some(*number), &folder.text(file)?),
+            None => Ok(None),
+        };
+        return frames.iter().map(one).collect();
+    }
+    match POSE_FILES.into_iter().find(|f| folder.has(f)) {
+        Some(file) => trajectory(folder, file, frames),
+        None => Ok(vec![None; frames.len()]),
+    }
+}

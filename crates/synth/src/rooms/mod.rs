@@ -1,0 +1,5 @@
+//! The built-in scenes: where the furniture stands, and the camera's way through it.
+#[cfg(feature = "hall")]
+pub mod hall;
+pub mod office;
+pub mod room;
