@@ -176,7 +176,8 @@ fn work(
                 let depth_views = output.mesh_views;
                 let wanted = MeshProtocols { depth_views, ..MeshProtocols::default() };
                 let sequence = sequence.as_mut();
-                mesh_evaluation::score(mesh, truth, sequence, &wanted, &mut metrics, screen);
+                screen.note("comparing the mesh with the true one");
+                mesh_evaluation::score(mesh, truth, sequence, &wanted, &mut metrics);
             }
             Err(reason) => {
                 metrics.absent.insert("mesh", reason);

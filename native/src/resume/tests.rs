@@ -47,18 +47,6 @@ fn a_lost_device_names_the_checkpoint() {
     assert!(!error.downcast_ref::<Interrupted>().expect("a typed error").device);
 }
 
-#[test]
-fn the_short_form_is_told_from_the_whole_command() {
-    let of = |text: &str| Invocation {
-        arguments: text.split(' ').map(str::to_owned).collect(),
-        folder: PathBuf::new(),
-    };
-    assert_eq!(of("run --resume out").only_resumes(), Some("out"));
-    assert_eq!(of("-q run --resume=out --json").only_resumes(), Some("out"));
-    assert_eq!(of("run --resume out --engine cpu").only_resumes(), None);
-    assert_eq!(of("run room --resume").only_resumes(), None);
-}
-
 /// The graphics engine, or `None` with a message where there is no adapter.
 fn gpu() -> Option<StartedEngine> {
     match engine::start(&EngineArgs { engine: EngineChoice::Gpu, adapter: None }) {
