@@ -134,7 +134,6 @@ impl Saved {
         config: &Config,
         sequence: &mut dyn Sequence,
         record: &RunRecord,
-        terminal: &mut Terminal,
     ) -> Result<Run> {
         let Saved { path, run: saved } = self;
         let advice = || no_resumption(&path);
@@ -150,7 +149,7 @@ impl Saved {
             );
         }
         let info = sequence.info().clone();
-        let resumed = saved.resume(engine, config.clone(), &info, sequence, terminal);
+        let resumed = saved.resume(engine, config.clone(), &info, sequence, &mut ());
         let mut run = match block_on(resumed) {
             Ok(run) => run,
             Err(RunError::Input { error, .. }) => {

@@ -131,7 +131,7 @@ fn a_device_lost_in_the_middle_leaves_a_run_to_go_on_with() {
     record.set_engine(
         &engine::start(&EngineArgs { engine: EngineChoice::Cpu, adapter: None }).unwrap().record,
     );
-    let resumed = saved.resume(Engine::cpu(), &config, &mut sequence, &record, &mut terminal);
+    let resumed = saved.resume(Engine::cpu(), &config, &mut sequence, &record);
     let mut run = resumed.unwrap();
     steps::take_all(&mut run, &mut sequence, "room", None, &mut terminal).unwrap();
     let (slam, log) = run.into_parts();
