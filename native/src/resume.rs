@@ -149,7 +149,8 @@ impl Saved {
             );
         }
         let info = sequence.info().clone();
-        let resumed = saved.resume(engine, config.clone(), &info, sequence, &mut ());
+        let mut quiet = ();
+        let resumed = saved.resume(engine, config.clone(), &info, sequence, &mut quiet);
         let mut run = match block_on(resumed) {
             Ok(run) => run,
             Err(RunError::Input { error, .. }) => {

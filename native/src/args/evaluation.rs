@@ -1,5 +1,5 @@
 //! Options of `eval`, and its manual: what each figure means.
-use super::{ClassArgs, EngineArgs};
+use super::{engine::EngineArgs, recording::ClassArgs};
 use clap::{Args, ValueEnum, ValueHint};
 use std::path::PathBuf;
 
