@@ -51,7 +51,7 @@ for (const [module, resolution] of [["ESNext", "bundler"], ["NodeNext", "NodeNex
       export const opened: Promise<boolean> = slam.open({ kind: "built-in", scene: "room", frames: 3, width: 64, noise: false }, settings);
     `);
     writeFileSync(join(folder, "bad.ts"), 'import { MteSlam } from "mte-slam";\nnew MteSlam().on("nonsense", () => {});\n');
-    const check = (file) => execFileSync(process.execPath, [tsc, "--noEmit", "--strict", "--skipLibCheck", "false", "--types", "", "--target", "ES2022", "--lib", "ES2022,DOM", "--module", module, "--moduleResolution", resolution, file], { cwd: folder, encoding: "utf8", stdio: "pipe" });
+    const check = (file) => execFileSync(process.execPath, [tsc, "--noEmit", "--strict", "--skipLibCheck", "false", "--types", "", "--target", "ES2022", "--lib", "ES2022,DOM,ESNext.Disposable", "--module", module, "--moduleResolution", resolution, file], { cwd: folder, encoding: "utf8", stdio: "pipe" });
     try {
       check("good.ts");
     } catch (e) {

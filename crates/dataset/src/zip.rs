@@ -164,7 +164,8 @@ impl<R: Read + Seek> Source for ZipSource<R> {
                 let reason = "has a password".into();
                 return Err(SequenceError::Read { file: file.into(), reason });
             }
-            let place = (entry.data_start(), entry.compressed_size());
+            let start = entry.data_start().ok_or_else(|| failed(io::ErrorKind::NotFound.into()))?;
+            let place = (start, entry.compressed_size());
             (entry.size(), entry.compression(), place)
         };
         let end = offset.checked_add(bytes as u64);
