@@ -1,10 +1,13 @@
 //! The command line as clap reads it. The texts here are the program's manual, so they teach:
 //! what a command does, what it writes, and an example to copy.
+mod engine;
 mod evaluation;
 mod recording;
 mod suite;
+mod values;
 
 use crate::invocation::Invocation;
+pub use engine::{EngineArgs, EngineChoice};
 pub use evaluation::{CullChoice, EvalArgs, InferenceChoice, MiouProtocol};
 pub use recording::{
     ClassArgs, ColorChoice, ConvertArgs, InspectArgs, SelectionArgs, SensorArgs, TargetLayout,
@@ -12,9 +15,9 @@ pub use recording::{
 pub use suite::EvaluateArgs;
 
 use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
-use glam::{DQuat, DVec3};
 use mte_slam_types::pose::Pose;
 use std::path::PathBuf;
+use values::{at_least_one, picture_width, pose, positive_metres};
 
 /// Neural RGB-D semantic SLAM on any GPU, or none.
 #[derive(Debug, Parser)]
@@ -202,30 +205,6 @@ impl Command {
             _ => None,
         }
     }
-}
-
-/// Which engine computes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum EngineChoice {
-    /// A hardware graphics adapter if there is one, else the processor (which beats software
-    /// adapters such as llvmpipe).
-    #[default]
-    Auto,
-    /// A graphics adapter (Vulkan, Metal or DirectX 12); an error without one.
-    Gpu,
-    /// The processor: the kernels' Rust twins on all cores.
-    Cpu,
-}
-
-/// Engine options.
-#[derive(Clone, Debug, Default, Args)]
-pub struct EngineArgs {
-    /// What computes.
-    #[arg(long, value_enum, default_value_t, value_name = "ENGINE", help_heading = "Engine")]
-    pub engine: EngineChoice,
-    /// Take the adapter whose name contains this text (see `mte-slam info`).
-    #[arg(long, value_name = "NAME", help_heading = "Engine")]
-    pub adapter: Option<String>,
 }
 
 /// How poses are tracked.
@@ -554,43 +533,4 @@ pub struct SettingsArgs {
     /// Print the browser package's types of the settings.
     #[arg(long, hide = true)]
     pub typescript: bool,
-}
-
-fn pose(text: &str) -> Result<Pose, String> {
-    let expected = "expected 7 numbers: tx ty tz in metres, qx qy qz qw of length 1";
-    let numbers: Vec<f64> = text
-        .split_whitespace()
-        .map(str::parse)
-        .collect::<Result<_, _>>()
-        .map_err(|_| format!("found something that is no number, {expected}"))?;
-    let [x, y, z, qx, qy, qz, qw] = numbers[..] else {
-        return Err(format!("found {} numbers, {expected}", numbers.len()));
-    };
-    let (t, q) = (DVec3::new(x, y, z), DQuat::from_xyzw(qx, qy, qz, qw));
-    // As in files of poses: more than rounding is a mistake, such as another order.
-    if !t.is_finite() || !(0.99..=1.01).contains(&q.length()) {
-        return Err(format!("found a quaternion of length {}, {expected}", q.length()));
-    }
-    Ok(Pose::from_quaternion(t, q))
-}
-
-fn at_least_one(text: &str) -> Result<usize, String> {
-    match text.parse::<usize>() {
-        Ok(n) if n >= 1 => Ok(n),
-        _ => Err("found no whole number of at least 1, expected for example 10".to_owned()),
-    }
-}
-
-fn picture_width(text: &str) -> Result<u32, String> {
-    match text.parse::<u32>() {
-        Ok(n) if (32..=1280).contains(&n) && n % 4 == 0 => Ok(n),
-        _ => Err("expected a multiple of 4 from 32 to 1280".to_owned()),
-    }
-}
-
-fn positive_metres(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(m) if (0.001..=1.0).contains(&m) => Ok(m),
-        _ => Err("expected metres from 0.001 to 1".to_owned()),
-    }
 }

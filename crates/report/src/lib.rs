@@ -1,9 +1,10 @@
-//! What is said about a run, and how: figures with the protocol they were measured by, as
-//! `metrics.json`, tables, pictures and pages.
+#![doc = include_str!("../README.md")]
+//! # Modules
 //!
 //! - [`evaluation`], [`class_truth`], [`mesh_evaluation`], [`novel`]: figures of a trajectory, of
 //!   rendered views and their classes, of a mesh, and of views that a run never saw;
-//! - [`protocol`]: what a figure means, as an id and a sentence; [`metrics`]: `metrics.json` and the table that people read;
+//! - [`protocol`]: what a figure means, as an id and a sentence; [`metrics`]: `metrics.json` and the
+//!   table that people read;
 //! - [`ablation`]: `ablation.json` and `ablation.md`;
 //! - [`suite`]: many runs over scenes, seeds, presets and ablations, and [`suite_report`], what a
 //!   suite has measured, as JSON, CSV, HTML and Markdown;

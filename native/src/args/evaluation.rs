@@ -1,5 +1,5 @@
 //! Options of `eval`, and its manual: what each figure means.
-use super::{ClassArgs, EngineArgs};
+use super::{engine::EngineArgs, recording::ClassArgs};
 use clap::{Args, ValueEnum, ValueHint};
 use std::path::PathBuf;
 
@@ -9,7 +9,8 @@ renders/ and mesh.ply and the recording they came from; no engine is started (bu
 views and --miou-protocol sni, which render the map of checkpoint.safetensors). Writes OUT/eval.json and \
 prints the table. Works for files of other programs too, if they follow the same formats.
 
-Figures and their protocols (in brackets their section in metrics.json and eval.json):
+Figures and their protocols (in brackets their section in metrics.json and eval.json, where
+`protocol` says it in words and `protocol_id` names it: figures compare where ids are equal):
     ATE RMSE [trajectory]         translation, all frames with a finite true pose, lost ones
                                   included; SE(3) alignment by Umeyama without scale, and unaligned
     depth L1, views [depth]       rendered at estimated poses, without depth input, against the

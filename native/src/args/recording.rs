@@ -1,5 +1,5 @@
 //! Which recording is read, and how; and the commands that are about recordings alone.
-use super::at_least_one;
+use super::values::at_least_one;
 use clap::{Args, ValueEnum, ValueHint};
 use mte_slam_dataset::GivenCamera;
 use std::path::PathBuf;

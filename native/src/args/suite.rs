@@ -1,5 +1,5 @@
 //! Suites.
-use super::at_least_one;
+use super::values::at_least_one;
 use clap::{Args, ValueHint};
 use std::path::PathBuf;
 

@@ -23,8 +23,6 @@ use tiny_http::{HTTPVersion, Header, Method, Request, Response, Server, StatusCo
 const MAX_REQUESTS: usize = 32;
 /// Longest address of a request \[bytes\].
 const MAX_URL_BYTES: usize = 2048;
-/// Page files beyond this are not sent \[bytes\].
-pub(crate) const MAX_PAGE_FILE_BYTES: u64 = 64 << 20;
 
 /// Opens the recording afresh: every stream reads on its own.
 pub type Opener = Box<dyn Fn() -> Result<Box<dyn Sequence>> + Send + Sync>;

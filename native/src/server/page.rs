@@ -1,11 +1,12 @@
 //! The page's files.
-use super::MAX_PAGE_FILE_BYTES;
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
-/// Tells the page that its server has a recording to offer.
+/// Larger files are not sent \[bytes\].
+const MAX_PAGE_FILE_BYTES: u64 = 64 << 20;
+/// Says to the page that its server has a recording to offer.
 const MARK: &str = r#"<meta name="mte-slam-serve" content="api/info">"#;
 
 /// The folder of the built page, if there is one.

@@ -124,6 +124,9 @@ fn a_suite_measures_reports_and_does_nothing_twice() {
     let csv = fs::read_to_string(out.join("results.csv")).unwrap();
     let lines = csv.lines().filter(|l| l.contains(",trajectory.aligned_cm.rmse,")).count();
     assert_eq!(lines, 4);
+    assert!(csv.lines().next().is_some_and(|head| head.ends_with(",protocol,protocol_id")));
+    assert_eq!(csv.lines().filter(|l| l.ends_with(",ate/rigid@1")).count() % 4, 0);
+    assert!(csv.contains(",miou/all-images@1+renders/estimated-poses@1+labels/scored"), "{csv}");
 
     let page = fs::read_to_string(out.join("report.html")).unwrap();
     for part in [

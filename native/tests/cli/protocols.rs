@@ -52,6 +52,24 @@ fn a_run_has_every_figure_with_its_protocol() {
         let protocol = json[section]["protocol"].as_str().unwrap_or_default();
         assert!(protocol.contains(word), "{section}: {protocol:?}");
     }
+    for (path, id) in [
+        ("/trajectory", "ate/rigid@1"),
+        ("/renders", "renders/estimated-poses@1"),
+        ("/depth", "depth-l1/views@1"),
+        ("/color", "psnr/views@1"),
+        ("/semantics", "miou/all-images@1"),
+        ("/semantics/boundary", "boundary/3-pixels@1"),
+        ("/mesh", "surface/eslam@1"),
+        ("/mesh_coslam", "surface/coslam@1"),
+        ("/novel_views", "novel/recording@1"),
+        ("/novel_views/semantics", "miou/all-images@1"),
+        ("/time", "time/per-frame@1"),
+        ("/memory", "memory/peak@1"),
+    ] {
+        let object = json.pointer(path).unwrap_or_else(|| panic!("{path}: {json:#}"));
+        assert_eq!(object["protocol_id"], id, "{path}");
+        assert!(object["protocol"].as_str().is_some_and(|sentence| !sentence.is_empty()), "{path}");
+    }
     // Depth L1 of the mesh has a reason where six frames of a room leave no view.
     assert!(json["mesh_depth"].is_object() || json["absent"]["mesh_depth"].is_string());
     assert_eq!(json["novel_views"]["views"], 3);
@@ -101,6 +119,7 @@ fn the_true_mesh_against_itself_and_moved() {
     assert!(after < 0.3 * accuracy, "{after} after ICP, {accuracy} before");
     let protocol = aligned["mesh_frustum"]["protocol"].as_str().unwrap().to_owned();
     assert!(protocol.contains("after ICP"), "{protocol}");
+    assert_eq!(aligned["mesh_frustum"]["protocol_id"], "surface/frustum-icp@1");
 }
 
 #[test]
