@@ -175,7 +175,7 @@ def same_samples(mesh, stream, seed):
 
 def surface(table, name, ours, truth, report, own_samples):
     """Accuracy, completion and ratio; both meshes are culled already."""
-    if "after ICP" in report["protocol"]:
+    if "-icp@" in report["protocol_id"]:
         clouds = []
         for mesh in (ours, truth):
             points = trimesh.sample.sample_surface(mesh.as_trimesh(), SAMPLES, seed=7)[0]

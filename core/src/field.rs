@@ -69,8 +69,12 @@ impl FieldShape {
     }
 
     /// A map over exactly `bounds`, which a former map had. `None` when it would take more than
-    /// `max_floats` a set of planes.
-    pub fn restored(bounds: Bounds, config: &FieldConfig, max_floats: usize) -> Option<FieldShape> {
+    /// `max_floats` per set of planes.
+    pub(crate) fn restored(
+        bounds: Bounds,
+        config: &FieldConfig,
+        max_floats: usize,
+    ) -> Option<FieldShape> {
         let e = bounds.max - bounds.min;
         let finest = config.geometry_fine_m.min(config.surface_fine_m);
         let n = e / finest + 2.0;
@@ -96,7 +100,7 @@ impl FieldShape {
     }
 
     /// The map grown by whole coarsest cells to hold `bounds`, or `None` when it holds it already.
-    pub fn grown(&self, bounds: Bounds, config: &FieldConfig) -> Option<FieldShape> {
+    pub(crate) fn grown(&self, bounds: Bounds, config: &FieldConfig) -> Option<FieldShape> {
         let step = config.surface_coarse_m.max(config.geometry_coarse_m);
         let (mut min, mut max) = (self.bounds.min, self.bounds.max);
         for k in 0..3 {
@@ -131,7 +135,13 @@ impl FieldShape {
 
     /// Copies plane values of `old` into the larger `self`; new cells get `fresh` values.
     /// `surface` chooses the grid.
-    pub fn carry_over(&self, old: &FieldShape, surface: bool, values: &[f32], fresh: &mut [f32]) {
+    pub(crate) fn carry_over(
+        &self,
+        old: &FieldShape,
+        surface: bool,
+        values: &[f32],
+        fresh: &mut [f32],
+    ) {
         let (from, to) =
             if surface { (&old.surface, &self.surface) } else { (&old.geometry, &self.geometry) };
         let cells = self.cells_m[usize::from(surface)];
@@ -157,7 +167,7 @@ impl FieldShape {
 }
 
 /// Normally distributed plane features, standard deviation 0.01 (ESLAM).
-pub fn initial_planes(floats: usize, seed: u32, salt: u32) -> Vec<f32> {
+pub(crate) fn initial_planes(floats: usize, seed: u32, salt: u32) -> Vec<f32> {
     (0..floats as u32)
         .map(|i| {
             // Box-Muller.

@@ -8,11 +8,15 @@ use mte_slam_fuzz::limit_memory;
 #[allow(dead_code)]
 #[path = "../../native/src/configuration.rs"]
 mod configuration;
+#[path = "../../crates/report/src/errors.rs"]
+mod report_errors;
+mod errors {
+    pub(crate) use crate::{UsageError, usage};
+}
+use report_errors::UsageError;
+// A file alone, so that the figures' threads stay out of the targets.
 #[allow(dead_code)]
-#[path = "../../native/src/errors.rs"]
-mod errors;
-#[allow(dead_code)]
-#[path = "../../native/src/output/trajectory.rs"]
+#[path = "../../crates/report/src/trajectory.rs"]
 mod trajectory;
 
 /// What of the command line the configuration reads (`native/src/args.rs`).

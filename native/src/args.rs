@@ -4,7 +4,7 @@ mod evaluation;
 mod recording;
 mod suite;
 
-use crate::resume::Invocation;
+use crate::invocation::Invocation;
 pub use evaluation::{CullChoice, EvalArgs, InferenceChoice, MiouProtocol};
 pub use recording::{
     ClassArgs, ColorChoice, ConvertArgs, InspectArgs, SelectionArgs, SensorArgs, TargetLayout,
@@ -74,7 +74,7 @@ pub enum Command {
         images         color/ (rgb/, images/) and depth/ with any numbered names, 16-bit PNG depth in\n                   \
         mm, and intrinsics.json, {\"fx\": .., \"fy\": .., \"cx\": .., \"cy\": ..} with, if wanted,\n                   \
         w, h, depth_scale (units per metre), k1 k2 p1 p2 k3; or --camera instead of it.\n                   \
-        Poses, if any: pose/0.txt, or traj.txt or poses.txt with 16 numbers a line\n    \
+        Poses, if any: pose/0.txt, or traj.txt or poses.txt with 16 numbers per line\n    \
         ScanNet's raw label ids become NYU's 40 classes where scannetv2-labels.combined.tsv lies in the\n    \
         folder or up to two above. `mte-slam inspect` says what is recognised and whether it fits.\n\n\
         The output folder receives:\n    \
@@ -84,7 +84,7 @@ pub enum Command {
         metrics.json         every figure with its protocol\n    \
         timings.csv          seconds of each frame\n    \
         config.toml          the complete effective configuration; --config takes it back\n    \
-        mesh.ply, mesh.glb   coloured; mesh_semantic.* in class colours, with ids (PLY) or a material a class (GLB)\n    \
+        mesh.ply, mesh.glb   coloured; mesh_semantic.* in class colours, with ids (PLY) or one material per class (GLB)\n    \
         legend.png, confusion.png, classes.csv   the classes, with figures where there are true labels\n    \
         renders/             colour, depth [mm], classes (ids, and in colour) and a comparison sheet of every K-th frame\n    \
         checkpoint.safetensors   the map; `mesh` and `render` read it\n\n\
@@ -284,10 +284,10 @@ pub struct OutputArgs {
     #[arg(long, value_name = "N", default_value_t = 1000, help_heading = "Output")]
     pub mesh_views: usize,
     /// Save the run after every N-th frame, and likewise in the last optimisation, so that
-    /// --resume can go on from there; 0 never does.
+    /// --resume can continue from there; 0 never does.
     #[arg(long, value_name = "N", default_value_t = 100, help_heading = "Interrupted runs")]
     pub checkpoint_every: usize,
-    /// Go on with an interrupted run, to the same files as if it had not been interrupted: DIR is
+    /// Continue an interrupted run, to the same files as if it had not been interrupted: DIR is
     /// its output folder, and all else is as it was started; or give it without DIR at the end of
     /// the same command. With the whole command, a run of which there is nothing yet starts, and
     /// one that has finished is left alone.
@@ -306,7 +306,7 @@ pub struct RunArgs {
     pub dataset: Option<PathBuf>,
     /// Take the recording and all options from this file, as `evaluate` writes one for each of its
     /// runs, and nothing else from the command line. The results go beside it; an interrupted run
-    /// is gone on with, and a finished one left alone.
+    /// is continued, and a finished one left alone.
     #[arg(long, value_name = "RUN.toml", value_hint = ValueHint::FilePath, help_heading = "Interrupted runs")]
     pub from: Option<PathBuf>,
     /// Which part of the recording, and how it is read.
@@ -385,7 +385,7 @@ pub struct ViewArgs {
     /// A pose: position in metres and quaternion, in quotes.
     #[arg(long, value_name = "tx ty tz qx qy qz qw", value_parser = pose, allow_hyphen_values = true)]
     pub pose: Option<Pose>,
-    /// A path of poses, `t tx ty tz qx qy qz qw` a line (TUM format).
+    /// A path of poses, one `t tx ty tz qx qy qz qw` per line (TUM format).
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub path: Option<PathBuf>,
 }
@@ -405,7 +405,7 @@ pub struct SynthArgs {
     /// Which scene.
     #[arg(long, value_enum, default_value_t, value_name = "SCENE")]
     pub scene: SceneChoice,
-    /// Write that many views from other poses to DIR/novel; `run` and `eval` score them apart.
+    /// Write N views from other poses to DIR/novel; `run` and `eval` score them apart.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub novel: usize,
 }
@@ -483,7 +483,7 @@ pub struct AblateArgs {
     /// Folder, .zip or .sens of the recording.
     #[arg(value_name = "DATASET", value_hint = ValueHint::AnyPath)]
     pub dataset: PathBuf,
-    /// Seeds 1 to N for each of the rows.
+    /// Seeds 1 to N for every row.
     #[arg(long, value_name = "N", default_value = "5", value_parser = at_least_one)]
     pub seeds: usize,
     /// Rows of the table, in this order.

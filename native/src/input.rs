@@ -9,14 +9,14 @@ use crate::{
     screen::Screen,
     source::{self, has_ending},
 };
-use anyhow::{Result, anyhow};
+use anyhow::{Error, Result};
 use mte_slam_dataset::{Axes, ClassList, LabelSource, Layout, OpenOptions};
 use mte_slam_mesh::Mesh;
 use mte_slam_synth::{SyntheticMesh, SyntheticOptions, SyntheticSequence};
 use mte_slam_types::{
     classes::UNLABELLED,
     frame::SequenceInfo,
-    sequence::{Sequence, Source},
+    sequence::{Sequence, SequenceError, Source},
 };
 use std::path::{Path, PathBuf};
 
@@ -32,7 +32,7 @@ pub struct Prepared {
     pub record: RunRecord,
 }
 
-/// Open a recording with the configuration that the flags, or else its layout, ask for.
+/// Opens a recording with the configuration that the flags, or else its layout, ask for.
 pub fn prepare(
     dataset: &Path,
     selection: &SelectionArgs,
@@ -95,7 +95,7 @@ pub fn folder_name(path: &Path) -> String {
     name.map_or("recording".to_owned(), |n| n.to_string_lossy().into_owned())
 }
 
-/// Open a recording.
+/// Opens a recording.
 pub fn open(path: &Path, selection: &SelectionArgs, screen: Screen) -> Result<Box<dyn Sequence>> {
     let layout = selection.layout.as_deref().map(layout_named).transpose()?;
     let (source, skipped_links) = source::open(path)?;
@@ -154,11 +154,24 @@ fn open_source(
         unlabelled_raw_id: selection.classes.unlabelled,
         ..OpenOptions::default()
     };
-    mte_slam_dataset::open(source, options).map_err(|e| {
-        let (message, name) = (e.to_string(), path.display().to_string());
-        // Errors about one file name it below the folder only.
-        if message.contains(&name) { anyhow!(message) } else { anyhow!("{name}: {message}") }
+    mte_slam_dataset::open(source, options).map_err(|error| {
+        if names_recording(&error, path) {
+            Error::from(error)
+        } else {
+            Error::from(error).context(path.display().to_string())
+        }
     })
+}
+
+/// Whether an error about a file names the recording, too; some name it below the folder only.
+fn names_recording(error: &SequenceError, recording: &Path) -> bool {
+    match error {
+        SequenceError::Read { file, .. } | SequenceError::Invalid { file, .. } => {
+            Path::new(file).starts_with(recording)
+        }
+        SequenceError::UnknownLayout { folder, .. } => Path::new(folder).starts_with(recording),
+        _ => false,
+    }
 }
 
 /// A built-in list of classes, or one from a file.

@@ -3,22 +3,20 @@
 #![forbid(unsafe_code)]
 
 mod args;
-mod class_truth;
+mod command_line;
 mod commands;
 mod configuration;
 mod engine;
 mod errors;
-mod evaluation;
 mod host;
 mod input;
+mod invocation;
 mod memory;
-mod mesh_evaluation;
 mod novel;
 mod output;
 mod pipeline;
 mod progress;
 mod record;
-mod report;
 mod restore;
 mod results;
 mod resume;
@@ -31,11 +29,12 @@ mod synthetic;
 mod views;
 
 use args::{Cli, Command};
+use mte_slam_report::{class_truth, evaluation, mesh_evaluation};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     suite::process::end_with_parent();
-    match resume::command_line().and_then(|cli| follow(&cli)) {
+    match command_line::command_line().and_then(|cli| follow(&cli)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");

@@ -102,14 +102,12 @@ fn work(
     for warning in sequence.warnings() {
         screen.note(&format!("note: {warning}"));
     }
-    let mut progress = screen.progress("tracking and mapping", info.frames);
-    let mut terminal = Terminal::new(&mut progress, sequence.as_ref());
     let mut run = match saved {
         None => block_on(Run::new(started.engine, effective.config.clone(), &info))
             .context("the map cannot be set up")?,
         Some(saved) => {
             let (engine, config) = (started.engine, &effective.config);
-            let run = saved.resume(engine, config, sequence.as_mut(), &record, &mut terminal)?;
+            let run = saved.resume(engine, config, sequence.as_mut(), &record)?;
             screen.note(&format!("resumed after {} of {} frames", run.next_frame(), info.frames));
             run
         }
@@ -120,13 +118,10 @@ fn work(
     if saver.begin(&output.invocation)? {
         screen.note("note: an interrupted run was left here, which --resume would have continued");
     }
-    steps::take_all(
-        &mut run,
-        sequence.as_mut(),
-        &record.dataset,
-        Some(&mut *saver),
-        &mut terminal,
-    )?;
+    let mut progress = screen.progress("tracking and mapping", info.frames);
+    let mut terminal = Terminal::new(&mut progress, sequence.as_ref());
+    let saving = Some(&mut *saver);
+    steps::take_all(&mut run, sequence.as_mut(), &record.dataset, saving, &mut terminal)?;
     progress.finish();
     let (mut slam, Log { frames, finish_s, earlier_s, notes }) = run.into_parts();
     let timings = results::timings(&frames);
@@ -181,7 +176,8 @@ fn work(
                 let depth_views = output.mesh_views;
                 let wanted = MeshProtocols { depth_views, ..MeshProtocols::default() };
                 let sequence = sequence.as_mut();
-                mesh_evaluation::score(mesh, truth, sequence, &wanted, &mut metrics, screen);
+                screen.note("comparing the mesh with the true one");
+                mesh_evaluation::score(mesh, truth, sequence, &wanted, &mut metrics);
             }
             Err(reason) => {
                 metrics.absent.insert("mesh", reason);

@@ -26,7 +26,7 @@ pub struct RunRecord {
     pub layout: String,
     /// First frame taken.
     pub start: usize,
-    /// Every how many-th frame was taken.
+    /// Step between the frames taken.
     pub stride: usize,
     /// Frames taken.
     pub frames: usize,
@@ -117,7 +117,7 @@ impl RunRecord {
         }
     }
 
-    /// Note the engine.
+    /// Notes the engine.
     pub fn set_engine(&mut self, engine: &EngineRecord) {
         self.engine.clone_from(&engine.kind);
         self.adapter.clone_from(&engine.adapter);

@@ -18,6 +18,7 @@ use crate::{
 use anyhow::Result;
 use glam::DVec3;
 use mte_slam_core::slam::{PoseEstimate, Slam, TrackingStatus};
+use mte_slam_report::protocol::Protocol;
 use mte_slam_run::FrameLog;
 use mte_slam_types::{classes::ClassTable, frame::SequenceInfo, pose::Pose, sequence::Sequence};
 use std::time::Instant;
@@ -33,12 +34,8 @@ pub fn write_anchors(slam: &Slam, folder: &OutputFolder, metrics: &mut Metrics) 
     let limit = slam.config().suppressor.anchors;
     let svg = plot::anchors_svg(&slam.info().name, &history, limit);
     folder.write("anchors.svg", svg.as_bytes())?;
-    metrics.anchors = Some(AnchorFigures {
-        protocol: "after each call of the optimisation: last frame, anchors in use, and since the start spawned, dropped, merged",
-        limit,
-        last: *last,
-        history,
-    });
+    metrics.anchors =
+        Some(AnchorFigures { protocol: Protocol::Anchors, limit, last: *last, history });
     Ok(())
 }
 
@@ -166,9 +163,7 @@ pub fn configuration_record(effective: &Effective) -> Result<ConfigurationRecord
 /// What a run that began at `start` cost, for metrics.json.
 pub fn time_figures(timings: &[Timing], last_optimisation_s: f64, start: Instant) -> TimeFigures {
     TimeFigures {
-        protocol: "wall clock a frame, median and 95th percentile; without reading and decoding \
-                   images, without evaluation, and without the last optimisation, which is given \
-                   apart. The first frame is not tracked; its mapping may compile pipelines",
+        protocol: Protocol::Time,
         tracking: Spread::of(timings.iter().skip(1).map(|t| t.tracking_s)),
         mapping: Spread::of(timings.iter().map(|t| t.mapping_s).filter(|s| *s > 0.0)),
         total: Spread::of(timings.iter().map(|t| t.total_s)),
@@ -185,7 +180,7 @@ pub fn memory_figures(slam: &Slam) -> MemoryFigures {
         Err(reason) => (None, Some(reason)),
     };
     MemoryFigures {
-        protocol: "host: peak resident set of the whole program, evaluation included (without a hardware adapter it holds the device's buffers, too); device: sum of the engine's buffers, without the driver's own",
+        protocol: Protocol::Memory,
         peak_host_bytes,
         peak_host_unknown,
         device_bytes: slam.memory_bytes() as u64,

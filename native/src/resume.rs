@@ -4,15 +4,13 @@
 //! (what was typed, and where) and `checkpoint.safetensors`, which a newer one replaces as a whole.
 //! A finished run removes the folder after its results are in place.
 use crate::{
-    args::{Cli, Command},
     errors::usage,
     host::Terminal,
-    output::{checkpoint, folder::replace_file},
+    invocation::Invocation,
+    output::{checkpoint, folder::replace_file, metrics::SavingFigures},
     record::{self, RunRecord},
-    suite::run_file,
 };
 use anyhow::{Context, Result, bail};
-use clap::Parser;
 use mte_slam_core::{
     config::Config,
     engine::{Engine, EngineError},
@@ -29,116 +27,13 @@ use std::{
 };
 
 /// Where checkpoints lie in an output folder.
-pub const FOLDER: &str = ".resume";
+pub use mte_slam_report::files::RESUME_FOLDER as FOLDER;
+
 const CHECKPOINT: &str = "checkpoint.safetensors";
-const COMMAND: &str = "command.json";
+/// The command line that started the run.
+pub const COMMAND: &str = "command.json";
 /// Parts of the last optimisation (of 20 iterations) between checkpoints, at most.
 const PARTS: usize = 10;
-
-/// A command line, so that `--resume OUT` can repeat it.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub struct Invocation {
-    arguments: Vec<String>,
-    /// Working directory, which relative paths start from.
-    folder: PathBuf,
-}
-
-impl Invocation {
-    /// Of this process; empty where an argument is not Unicode, and cannot be kept as JSON.
-    fn here() -> Invocation {
-        let arguments: Result<Vec<String>, _> =
-            std::env::args_os().skip(1).map(std::ffi::OsString::into_string).collect();
-        Invocation {
-            arguments: arguments.unwrap_or_default(),
-            folder: std::env::current_dir().unwrap_or_default(),
-        }
-    }
-
-    /// The folder, when this is `run --resume DIR` and nothing else that matters.
-    fn only_resumes(&self) -> Option<&str> {
-        self.only("--resume")
-    }
-
-    /// The value of `flag`, when there is nothing else that matters after the command.
-    fn only(&self, flag: &str) -> Option<&str> {
-        let quiet = ["-q", "--quiet", "--json"];
-        let rest: Vec<&str> =
-            self.arguments.iter().map(String::as_str).filter(|a| !quiet.contains(a)).collect();
-        match rest[..] {
-            [_, name, value] if name == flag => Some(value),
-            [_, both] => both.strip_prefix(flag)?.strip_prefix('='),
-            _ => None,
-        }
-    }
-}
-
-/// The command line of this process, or the one that `--resume DIR` stands for.
-pub fn command_line() -> Result<Cli> {
-    let invocation = Invocation::here();
-    let mut cli = from_file(Cli::parse(), &invocation)?;
-    let Some(output) = cli.command.output_mut() else { return Ok(cli) };
-    let dir = output.resume.take_if(|r| r.is_some()).flatten();
-    let Some(dir) = dir else {
-        output.invocation = invocation;
-        return Ok(cli);
-    };
-    if invocation.only_resumes().is_none() {
-        // With the whole command line, DIR is its output folder.
-        if output.out.as_ref().is_some_and(|out| *out != dir) {
-            usage!("--resume {}: found --out with another folder, expected one", dir.display());
-        }
-        output.out = Some(dir);
-        output.resume = Some(None);
-        output.invocation = invocation;
-        return Ok(cli);
-    }
-    let path = dir.join(FOLDER).join(COMMAND);
-    if !path.is_file() {
-        usage!(
-            "--resume {0}: found no interrupted run ({1}), expected the output folder of one. If \
-             it has finished, there is nothing to do.",
-            dir.display(),
-            path.display()
-        );
-    }
-    let name = path.display().to_string();
-    let text = fs::read_to_string(&path).with_context(|| format!("{name}: cannot be read"))?;
-    let kept: Invocation =
-        serde_json::from_str(&text).with_context(|| format!("{name}: not a command line"))?;
-    let advice = "repeat the whole command with --resume at its end";
-    if kept.arguments.is_empty() {
-        bail!("{name}: the command line is not Unicode and was not kept: {advice}");
-    }
-    let program = std::iter::once("mte-slam".to_owned());
-    let mut first = Cli::try_parse_from(program.chain(kept.arguments.iter().cloned()))
-        .map_err(|e| anyhow::anyhow!("{name}: {e}{advice}"))?;
-    let out = dir.canonicalize().with_context(|| format!("{}: no such folder", dir.display()))?;
-    std::env::set_current_dir(&kept.folder).with_context(|| {
-        format!("{}: the run was started there: {advice}", kept.folder.display())
-    })?;
-    first = from_file(first, &kept)?;
-    let Some(output) = first.command.output_mut() else {
-        bail!("{name}: found a command that makes no run");
-    };
-    (output.out, output.resume, output.invocation) = (Some(out), Some(None), kept);
-    (first.quiet, first.json) = (cli.quiet, cli.json);
-    Ok(first)
-}
-
-/// With `run --from FILE`: what the file stands for.
-fn from_file(mut cli: Cli, invocation: &Invocation) -> Result<Cli> {
-    let Command::Run(args) = &mut cli.command else { return Ok(cli) };
-    let Some(file) = args.from.take() else { return Ok(cli) };
-    // An argument that is not Unicode leaves none to compare.
-    if !invocation.arguments.is_empty() && invocation.only("--from").is_none() {
-        usage!(
-            "--from {}: found other arguments beside it, expected none: the file has them all",
-            file.display()
-        );
-    }
-    *args = run_file::run_args(&file)?;
-    Ok(cli)
-}
 
 /// What this program keeps in a checkpoint.
 #[derive(Serialize, Deserialize)]
@@ -239,7 +134,6 @@ impl Saved {
         config: &Config,
         sequence: &mut dyn Sequence,
         record: &RunRecord,
-        terminal: &mut Terminal,
     ) -> Result<Run> {
         let Saved { path, run: saved } = self;
         let advice = || no_resumption(&path);
@@ -255,7 +149,8 @@ impl Saved {
             );
         }
         let info = sequence.info().clone();
-        let resumed = saved.resume(engine, config.clone(), &info, sequence, terminal);
+        let mut quiet = ();
+        let resumed = saved.resume(engine, config.clone(), &info, sequence, &mut quiet);
         let mut run = match block_on(resumed) {
             Ok(run) => run,
             Err(RunError::Input { error, .. }) => {
@@ -284,17 +179,6 @@ impl Saved {
         }
         Ok(run)
     }
-}
-
-/// What checkpoints cost.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
-pub struct SavingFigures {
-    /// How many were written since the last start.
-    pub count: usize,
-    /// Size of the last one.
-    pub bytes: usize,
-    /// Mean time of reading the device's state back, writing it and waiting for the disk \[s\].
-    pub mean_s: f64,
 }
 
 /// Writes checkpoints.

@@ -1,15 +1,16 @@
 //! Built-in sequences as files.
-use crate::{input, novel, output::new_folder::NewFolder};
+use crate::{input, output::new_folder::NewFolder};
 use anyhow::{Context, Result};
 use mte_slam_dataset::{ColorFormat, RecordingWriter, ReplicaWriter};
 use mte_slam_mesh::write_ply;
+use mte_slam_report::novel;
 use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
 use mte_slam_types::{frame::SequenceInfo, sequence::Sequence};
 use std::path::Path;
 
-/// Write a built-in sequence, so many views from other poses, and the true mesh to a folder, in
+/// Writes a built-in sequence, `novel_views` views from other poses, and the true mesh to a folder, in
 /// Replica's (NICE-SLAM's) layout, without any loss: a run reads the very frames that `demo` sees.
-/// `written` is told how many frames are done.
+/// `written` receives how many frames are done.
 pub fn write(
     dir: &Path,
     options: SyntheticOptions,

@@ -6,6 +6,7 @@ use crate::{
 };
 use anyhow::{Context, Result};
 use mte_slam_core::slam::{PoseEstimate, Slam, View};
+pub use mte_slam_report::evaluation::score_view;
 use mte_slam_types::{classes::ClassTable, frame::Frame, sequence::Sequence};
 use pollster::block_on;
 
@@ -73,19 +74,6 @@ pub fn render_frame(
     let view = block_on(slam.render(&estimate.world_from_camera, &camera))
         .with_context(|| format!("rendering frame {}", estimate.frame))?;
     Ok((frame, view))
-}
-
-/// Scores a view, whose classes become those of the truth's table. Returns the frame as the map
-/// was trained with it, and its true labels.
-pub fn score_view(
-    scores: &mut ViewScores,
-    frame: &Frame,
-    view: &mut View,
-) -> Result<(Frame, Option<Vec<u8>>)> {
-    view.class = scores.truth().of_map(&view.class);
-    let (trained, labels) = scores.registered(frame)?;
-    scores.add(&trained, view, labels.as_deref())?;
-    Ok((trained.into_owned(), labels))
 }
 
 /// Colour, depth and, with classes, class pictures of a view, given to `write` with their kind.

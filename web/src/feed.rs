@@ -2,15 +2,14 @@
 //! decoded frames from `mte-slam serve`, which the browser takes as fast as they are used.
 use crate::{message::ErrorKind, platform::sleep, source::last_part};
 use js_sys::{Reflect, Uint8Array};
+use mte_slam_dataset::stream::{FrameDecoder, StreamError, StreamInfo};
 use mte_slam_run::{Event, Host, Input};
 use mte_slam_types::{
-    camera::Camera,
     classes::ClassTable,
-    frame::{Bounds, Frame, SequenceInfo},
+    frame::{Frame, SequenceInfo},
     pose::Pose,
     sequence::Sequence,
 };
-use serde::Deserialize;
 use wasm_bindgen::{JsCast, JsValue};
 use wasm_bindgen_futures::JsFuture;
 use web_sys::{ReadableStreamDefaultReader, Response, WorkerGlobalScope};
@@ -95,28 +94,6 @@ impl Input for Feed {
     }
 }
 
-/// What `mte-slam serve` says of a recording, at `api/info`.
-#[derive(Deserialize)]
-struct Info {
-    name: String,
-    camera: Camera,
-    depth_unit_m: f64,
-    frames: usize,
-    classes: ClassTable,
-    bounds: Option<Bounds>,
-    warnings: Vec<String>,
-    truth: Vec<Option<[f64; 16]>>,
-}
-
-/// Before the images of a frame.
-#[derive(Deserialize)]
-struct Header {
-    index: usize,
-    number: u64,
-    time_s: f64,
-    labels: bool,
-}
-
 /// A stream of frames.
 pub struct Stream {
     info: SequenceInfo,
@@ -128,7 +105,7 @@ pub struct Stream {
 
 struct Connection {
     reader: ReadableStreamDefaultReader,
-    waiting: Vec<u8>,
+    decoder: FrameDecoder,
     /// Index of the frame that comes next.
     next: usize,
 }
@@ -139,6 +116,15 @@ fn gone(message: String) -> FeedError {
 
 fn bad(message: String) -> FeedError {
     FeedError { kind: ErrorKind::BadFile, message }
+}
+
+impl From<StreamError> for FeedError {
+    fn from(error: StreamError) -> FeedError {
+        match error {
+            StreamError::Truncated { .. } => gone(error.to_string()),
+            _ => bad(error.to_string()),
+        }
+    }
 }
 
 async fn fetch(url: &str) -> Result<Response, FeedError> {
@@ -161,28 +147,15 @@ impl Stream {
         let response = fetch(&address).await?;
         let failed = |e: JsValue| gone(format!("{address}: {}", crate::source::reason(&e)));
         let text = JsFuture::from(response.text().map_err(failed)?).await.map_err(failed)?;
-        let info: Info =
-            serde_json::from_str(&text.as_string().unwrap_or_default()).map_err(|e| {
-                bad(format!("{address}: found {e}, expected a server of `mte-slam serve`"))
-            })?;
-        let pixels = info.camera.pixels();
-        if pixels == 0 || pixels > 1 << 26 || info.classes.len() > 255 {
-            return Err(bad(format!("{address}: found {:?}, expected a camera", info.camera)));
+        let mut info = StreamInfo::from_json(text.as_string().unwrap_or_default().as_bytes())
+            .map_err(|e| bad(format!("{address}: {e}")))?;
+        if info.name.is_empty() {
+            info.name = last_part(url);
         }
-        let pose = |p: &Option<[f64; 16]>| p.as_ref().and_then(Pose::from_row_major);
         Ok(Stream {
-            truth: info.truth.iter().map(pose).collect(),
+            truth: info.true_poses(),
+            info: info.sequence_info(),
             warnings: info.warnings,
-            info: SequenceInfo {
-                feature_channels: 0,
-                name: if info.name.is_empty() { last_part(url) } else { info.name },
-                layout: "stream",
-                camera: info.camera,
-                depth_unit_m: info.depth_unit_m,
-                frames: info.frames,
-                classes: info.classes,
-                bounds: info.bounds,
-            },
             base,
             open: None,
         })
@@ -207,72 +180,44 @@ impl Stream {
     async fn attempt(&mut self, index: usize) -> Result<Frame, FeedError> {
         let mut connection = match self.open.take() {
             Some(connection) if connection.next == index => connection,
-            _ => Connection::new(&self.base, index).await?,
+            _ => Connection::new(&self.base, index, self.info.camera.pixels()).await?,
         };
-        let pixels = self.info.camera.pixels();
-        let length = connection.take(4).await?;
-        let length = u32::from_le_bytes([length[0], length[1], length[2], length[3]]) as usize;
-        if length > 1 << 16 {
-            return Err(bad(format!("frame {index}: found a header of {length} bytes")));
+        let mut frame = connection.frame().await?;
+        if frame.index != index {
+            return Err(bad(format!("found frame {}, expected {index}", frame.index)));
         }
-        let text = connection.take(length).await?;
-        // A server that cannot read a frame says so in place of it.
-        if let Ok(problem) = serde_json::from_slice::<Problem>(&text) {
-            return Err(bad(problem.error));
-        }
-        let header: Header = serde_json::from_slice(&text)
-            .map_err(|e| bad(format!("frame {index}: found {e}, expected a frame's header")))?;
-        if header.index != index {
-            return Err(bad(format!("found frame {}, expected {index}", header.index)));
-        }
-        let color = connection.take(3 * pixels).await?;
-        let depth = connection.take(2 * pixels).await?;
-        let labels = if header.labels { Some(connection.take(pixels).await?) } else { None };
+        frame.truth = self.truth.get(index).copied().flatten();
         connection.next = index + 1;
         self.open = Some(connection);
-        Ok(Frame {
-            features: None,
-            index,
-            number: header.number,
-            time_s: header.time_s,
-            color: color.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
-            depth: depth.chunks_exact(2).map(|d| u16::from_le_bytes([d[0], d[1]])).collect(),
-            labels,
-            truth: self.truth.get(index).copied().flatten(),
-        })
+        Ok(frame)
     }
-}
-
-#[derive(Deserialize)]
-struct Problem {
-    error: String,
 }
 
 impl Connection {
-    async fn new(base: &str, from: usize) -> Result<Connection, FeedError> {
+    async fn new(base: &str, from: usize, pixels: usize) -> Result<Connection, FeedError> {
         let response = fetch(&format!("{base}api/stream?from={from}")).await?;
         let body = response.body().ok_or_else(|| gone("the server sends nothing".into()))?;
         let reader = body.get_reader().unchecked_into();
-        Ok(Connection { reader, waiting: Vec::new(), next: from })
+        Ok(Connection { reader, decoder: FrameDecoder::new(pixels), next: from })
     }
 
-    /// The next `n` bytes.
-    async fn take(&mut self, n: usize) -> Result<Vec<u8>, FeedError> {
-        while self.waiting.len() < n {
+    /// The next frame.
+    async fn frame(&mut self) -> Result<Frame, FeedError> {
+        loop {
+            if let Some(frame) = self.decoder.next_frame()? {
+                return Ok(frame);
+            }
             let failed =
                 |e: JsValue| gone(format!("the stream broke off: {}", crate::source::reason(&e)));
             let part = JsFuture::from(self.reader.read()).await.map_err(failed)?;
             let get = |key: &str| Reflect::get(&part, &key.into()).unwrap_or(JsValue::UNDEFINED);
             if get("done").is_truthy() {
+                self.decoder.finish()?;
                 return Err(gone("the stream ended early".into()));
             }
             let bytes: Uint8Array = get("value").unchecked_into();
-            let at = self.waiting.len();
-            self.waiting.resize(at + bytes.length() as usize, 0);
-            bytes.copy_to(&mut self.waiting[at..]);
+            self.decoder.push(&bytes.to_vec());
         }
-        let rest = self.waiting.split_off(n);
-        Ok(std::mem::replace(&mut self.waiting, rest))
     }
 }
 

@@ -22,11 +22,14 @@ pub const HAS_SAMPLE_HEAD: bool = cfg!(feature = "sample-head");
 pub use batch::{Batch, ClassWeight, Rates, SemanticSupervision};
 pub use fusion::{Fusion, FusionLayer, FusionScratch};
 pub use parameters::ParameterTensor;
+pub use sample_head::SampleHead;
 #[cfg(feature = "sample-head")]
 pub use sample_head::SampleLayer;
-pub use sample_head::{SampleHead, SampleScratch};
+pub(crate) use sample_head::SampleScratch;
 pub(crate) use saved::Counters;
-pub use scratch::{QUERY_POINTS_MAX, Scratch, WINDOW_MAX};
-pub use slots::{FrameFormat, FrameSlots, TokenGrid, color_words, pose_from_words, pose_words};
+pub use scratch::Scratch;
+pub(crate) use scratch::WINDOW_MAX;
+pub use slots::{FrameFormat, FrameSlots, TokenGrid, pose_words};
+pub(crate) use slots::{color_words, pose_from_words};
 pub use state::Map;
 pub use suppressor::{AnchorCounts, Suppressor};

@@ -15,9 +15,9 @@ pub(super) const GEOMETRY_ROWS: u32 = 64;
 /// Rays per row of partial sums of the per-ray decoders.
 pub(super) const DECODER_CHUNK: u32 = 250;
 /// Points a query holds at most.
-pub const QUERY_POINTS_MAX: usize = 1 << 17;
+pub(super) const QUERY_POINTS_MAX: usize = 1 << 17;
 /// Most frames a window holds.
-pub const WINDOW_MAX: usize = 64;
+pub(crate) const WINDOW_MAX: usize = 64;
 
 /// The buffers of a batch: passes write them before they read them, so they are no state.
 pub struct Scratch {
@@ -26,7 +26,11 @@ pub struct Scratch {
     /// Activations and gradients of the fusion, where the map has one.
     pub fusion: Option<FusionScratch>,
     /// The same of the per-sample class head.
-    pub sample_head: Option<SampleScratch>,
+    #[cfg_attr(
+        not(feature = "sample-head"),
+        expect(dead_code, reason = "nothing but that head reads it")
+    )]
+    pub(super) sample_head: Option<SampleScratch>,
     /// Slots of the window's frames; bit 31: the pose is fixed.
     pub(super) window: Buffer<u32>,
     pub(super) rays: Buffer<Ray>,

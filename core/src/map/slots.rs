@@ -166,7 +166,7 @@ impl FrameSlots {
     ///
     /// # Errors
     /// Engine failures.
-    pub async fn read_color(
+    pub(crate) async fn read_color(
         &self,
         engine: &mut Engine,
         slot: u32,
@@ -214,7 +214,7 @@ impl FrameSlots {
 }
 
 /// Colour and label of a frame's pixels, as slots hold them.
-pub fn color_words(frame: &Frame) -> Vec<[u8; 4]> {
+pub(crate) fn color_words(frame: &Frame) -> Vec<[u8; 4]> {
     let label = |i: usize| frame.labels.as_ref().map_or(UNLABELLED, |l| l[i]);
     frame.color.iter().enumerate().map(|(i, c)| [c[0], c[1], c[2], label(i)]).collect()
 }
@@ -226,7 +226,7 @@ pub fn pose_words(pose: &Pose) -> [f32; POSE_FLOATS] {
 }
 
 /// The inverse of [`pose_words`], orthonormalised; `None` when a number is not finite.
-pub fn pose_from_words(w: &[f32]) -> Option<Pose> {
+pub(crate) fn pose_from_words(w: &[f32]) -> Option<Pose> {
     let v = |i: usize| f64::from(w[i]);
     let pose = Pose {
         rotation: DMat3::from_cols(

@@ -2,7 +2,7 @@
 //!
 //! Kept are the map with Adam's moments, poses, counters, the odometer's numbers and the small
 //! depth images that meshes are culled with. Keyframes' images are not: they are read from the
-//! recording again (`resume.rs`), and each frame's hash tells whether it is the same recording.
+//! recording again (`resume.rs`), and each frame's hash shows whether it is the same recording.
 use super::{
     PoseEstimate, Slam, SlamError, TrackingStatus,
     keyframes::{Observation, observation_step},
@@ -65,7 +65,7 @@ pub struct Tensor {
     pub bytes: Vec<u8>,
 }
 
-/// The state of a run: [`Slam::resume`] goes on from it, [`Slam::restore`] shows it.
+/// The state of a run: [`Slam::resume`] continues it, [`Slam::restore`] shows it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Checkpoint {
     /// Parameters, poses, kept depth images.
@@ -202,7 +202,7 @@ fn json(value: &impl Serialize) -> Result<String, SlamError> {
 
 impl Slam {
     /// The state of the run, between frames or calls of [`Slam::finish_step`]. Making one changes
-    /// nothing: the run goes on as it would have.
+    /// nothing: the run continues as it would have.
     ///
     /// # Errors
     /// [`SlamError::NoMap`] before the first frame, engine failures.

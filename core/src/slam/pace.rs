@@ -19,7 +19,7 @@ pub trait Pace {
         false
     }
 
-    /// Called between slices with the iterations done and their number; work goes on when the
+    /// Called between slices with the iterations done and their number; work continues when the
     /// future is ready.
     fn turn(&mut self, done: u32, total: u32) -> Turn<'_> {
         let _ = (done, total);

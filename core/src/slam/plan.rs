@@ -238,7 +238,7 @@ impl OptimisationPlan {
         (0..due).map(|step| self.slots[frame(step)]).collect()
     }
 
-    /// The rays of an iteration.
+    /// The batch of rays of one iteration.
     pub fn batch(&self, iteration: &IterationPlan) -> Batch<'_> {
         Batch {
             frames: iteration.window.len() as u32,

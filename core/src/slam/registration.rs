@@ -1,4 +1,5 @@
-//! What the odometry finds out late: where colour lies on depth, and poses that its keyframes move.
+//! What the odometry corrects later: where colour lies on depth, and poses of frames that its
+//! keyframes move.
 use super::{Slam, SlamError};
 use crate::{
     commands::Commands, config::Tracker, frame::Frame, track::odometry::ColorRegistration,
@@ -21,7 +22,7 @@ impl Slam {
 
     /// Takes over a registration of colour that the odometry found or improved. It settles only
     /// after some keyframes; the images of those before are stored already, so they are read back,
-    /// resampled and stored again. What the map has already learnt from them fades as later
+    /// resampled and stored again. What the map has learned from them already fades as later
     /// iterations draw from the corrected images.
     pub(super) async fn follow_registration(&mut self, frame: usize) -> Result<(), SlamError> {
         let found = self.odometer.color_registration();

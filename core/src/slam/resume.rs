@@ -1,4 +1,4 @@
-//! A run again from its checkpoint: to be shown, or to go on.
+//! A run from its checkpoint: to be shown, or to be continued.
 use super::{
     MapKeyframe, Slam, SlamError,
     checkpoint::{Checkpoint, Dtype, Saved, SequenceState, wrong},
@@ -32,7 +32,7 @@ impl Slam {
         Ok(slam)
     }
 
-    /// Goes on from a checkpoint, on a new engine: give [`Resuming::add`] the frames that
+    /// Continues from a checkpoint, on a new engine: give [`Resuming::add`] the frames that
     /// [`Resuming::missing`] names, then process frame [`Slam::next_frame`]. On an engine like the
     /// first one the run ends with the same bytes as if it had never been interrupted.
     ///
@@ -231,7 +231,7 @@ fn same<T: Serialize>(what: &str, saved: &T, now: &T) -> Result<(), SlamError> {
     let value = |t: &T| serde_json::to_value(t).map_err(|e| wrong(what, e, "JSON"));
     match first_difference(what.into(), &value(saved)?, &value(now)?) {
         None => Ok(()),
-        // In the words of who resumes: what the run has is expected, what is asked for is found.
+        // From the point of view of who resumes: what the run has is expected, what is asked for is found.
         Some((field, saved, now)) => {
             Err(wrong(field, now, format!("{saved}, as the run was made")))
         }

@@ -3,8 +3,8 @@ use super::Slam;
 use crate::config::Inference;
 
 impl Slam {
-    /// Whether any pixel that the map has learnt from had a class; without, its classes mean
-    /// nothing.
+    /// Whether any pixel that the map has been trained with had a class; otherwise its classes
+    /// mean nothing.
     pub fn labelled(&self) -> bool {
         self.class_counts.any()
     }

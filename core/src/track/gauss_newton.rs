@@ -1,5 +1,6 @@
-//! Damped Gauss-Newton on a pose from normal equations that the device sums; solved in f64.
+//! Damped Gauss-Newton on a pose from normal equations that the engine sums; solved in f64.
 use crate::{kernels::align_points::ALIGN_ROW, pose::Pose};
+use mte_slam_types::maths::solve_cholesky;
 
 /// When a result is not to be trusted.
 #[derive(Clone, Copy, Debug)]
@@ -20,7 +21,7 @@ impl Default for Guard {
     }
 }
 
-/// Levenberg-Marquardt, one evaluation a step.
+/// Levenberg-Marquardt, one evaluation per step.
 #[derive(Clone, Debug)]
 pub struct Solver {
     start: Pose,
@@ -37,44 +38,16 @@ pub struct Solver {
     last: Option<([[f64; 6]; 6], [f64; 6])>,
 }
 
-/// Solves A x = b for a symmetric positive definite A by Cholesky; `None` if it is not.
-pub fn solve6(a: &[[f64; 6]; 6], b: &[f64; 6]) -> Option<[f64; 6]> {
-    let mut l = [[0.0; 6]; 6];
-    for i in 0..6 {
-        for j in 0..=i {
-            let mut s = a[i][j];
-            for k in 0..j {
-                s -= l[i][k] * l[j][k];
-            }
-            if i == j {
-                if s.is_nan() || s <= 1e-12 * a[i][i].max(1e-300) {
-                    return None;
-                }
-                l[i][i] = num_traits::Float::sqrt(s);
-            } else {
-                l[i][j] = s / l[j][j];
-            }
-        }
-    }
-    let mut x = *b;
-    for i in 0..6 {
-        for k in 0..i {
-            x[i] -= l[i][k] * x[k];
-        }
-        x[i] /= l[i][i];
-    }
-    for i in (0..6).rev() {
-        for k in i + 1..6 {
-            x[i] -= l[k][i] * x[k];
-        }
-        x[i] /= l[i][i];
-    }
-    x.iter().all(|v| v.is_finite()).then_some(x)
+/// Solves A x = b for a symmetric positive definite A; `None` if it is not.
+fn solve6(a: &[[f64; 6]; 6], b: &[f64; 6]) -> Option<[f64; 6]> {
+    let (mut a, mut x) = (*a, *b);
+    let solved = solve_cholesky(a.as_flattened_mut(), &mut x, 1e-12);
+    (solved && x.iter().all(|v| v.is_finite())).then_some(x)
 }
 
 impl Solver {
     /// Starts at a pose known with `prior` information (for left retractions); `weight` scales the
-    /// device's sums against it.
+    /// engine's sums against it.
     pub fn new(start: Pose, prior: [[f64; 6]; 6], weight: f64, guard: Guard) -> Solver {
         Solver {
             start,

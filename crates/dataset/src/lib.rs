@@ -41,6 +41,7 @@ mod reader;
 mod resize;
 mod scannet_ids;
 mod stored;
+pub mod stream;
 mod write;
 mod zip;
 

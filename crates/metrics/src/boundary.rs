@@ -36,6 +36,8 @@ struct Counts {
 /// Figures of a [`BoundaryMeter`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BoundaryReport {
+    /// Id of the protocol, to compare by ([`crate::protocol`]).
+    pub protocol_id: String,
     /// What the figures mean.
     pub protocol: String,
     /// Mean boundary IoU \[%\] over the classes that have an outline in truth or prediction.
@@ -135,6 +137,7 @@ impl BoundaryMeter {
             (n > 0).then(|| values.iter().flatten().sum::<f64>() / n as f64)
         };
         Some(BoundaryReport {
+            protocol_id: crate::protocol::BOUNDARY.into(),
             protocol: format!(
                 "boundary IoU: a class's pixels within {BOUNDARY_PIXELS} pixels (a square) of \
                  another class, of truth and prediction (Cheng et al. 2021, image edge no outline); \

@@ -11,6 +11,8 @@ pub const MAX_PSNR_DB: f64 = 100.0;
 /// Peak signal-to-noise ratio of rendered colour.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PsnrReport {
+    /// Id of the protocol, to compare by ([`crate::protocol`]).
+    pub protocol_id: String,
     /// What the figures mean.
     pub protocol: String,
     /// Number of images.
@@ -64,6 +66,7 @@ impl PsnrMeter {
     /// Returns the figures so far, `None` without images.
     pub fn report(&self) -> Option<PsnrReport> {
         (self.images > 0).then(|| PsnrReport {
+            protocol_id: crate::protocol::PSNR_VIEWS.into(),
             protocol: "PSNR: 8-bit sRGB, peak 255, all pixels and channels".into(),
             images: self.images,
             mean_of_psnr_db: self.sum_db / self.images as f64,
@@ -76,6 +79,8 @@ impl PsnrMeter {
 /// Depth L1 of views.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DepthReport {
+    /// Id of the protocol, to compare by ([`crate::protocol`]).
+    pub protocol_id: String,
     /// What the figures mean.
     pub protocol: String,
     /// Number of images.
@@ -143,6 +148,7 @@ impl DepthMeter {
     /// Returns the figures so far, `None` when no pixel had both depths.
     pub fn report(&self) -> Option<DepthReport> {
         (self.both > 0).then(|| DepthReport {
+            protocol_id: crate::protocol::DEPTH_VIEWS.into(),
             protocol: "Depth L1, views: rendered against sensor depth, pixels with both".into(),
             images: self.images,
             pixels: self.both,

@@ -9,6 +9,7 @@ mod boundary;
 mod bvh;
 mod distance;
 mod image;
+pub mod protocol;
 mod semantic;
 mod surface;
 #[cfg(test)]

@@ -19,6 +19,8 @@ pub struct ConfusionMatrix {
 /// Figures of a [`ConfusionMatrix`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SemanticReport {
+    /// Id of the protocol, to compare by ([`crate::protocol`]).
+    pub protocol_id: String,
     /// What the figures mean.
     pub protocol: String,
     /// Number of images.
@@ -157,6 +159,7 @@ impl ConfusionMatrix {
             .collect();
         let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
         Some(SemanticReport {
+            protocol_id: crate::protocol::MIOU.into(),
             protocol: "mIoU: one confusion matrix over all images, unlabelled truth ignored".into(),
             images: self.images,
             pixels,

@@ -52,6 +52,9 @@ pub struct SurfaceFigures {
 /// Comparison of two meshes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SurfaceReport {
+    /// Id of the protocol, to compare by ([`crate::protocol`]); the caller names how the meshes were
+    /// culled and aligned.
+    pub protocol_id: String,
     /// What the figures mean; the caller adds how the meshes were culled and aligned.
     pub protocol: String,
     /// Samples per mesh.
@@ -146,7 +149,7 @@ pub fn evaluate_surface(
 ) -> Result<SurfaceReport, MetricsError> {
     let SurfaceOptions { samples, seed, threshold_m } = *options;
     if samples == 0 {
-        return Err(MetricsError::Size { what: "samples a mesh", found: 0, expected: 1 });
+        return Err(MetricsError::Size { what: "samples per mesh", found: 0, expected: 1 });
     }
     let of_estimate = sample_surface(estimate, samples, seed, 0, "estimated")?;
     let of_truth = sample_surface(truth, samples, seed, 1, "true")?;
@@ -164,8 +167,9 @@ pub fn evaluate_surface(
     let accuracy = distances(estimate_points.shapes(), &NearestBvh::of(triangles(truth)));
     let completion = distances(truth_points.shapes(), &NearestBvh::of(triangles(estimate)));
     Ok(SurfaceReport {
+        protocol_id: crate::protocol::SURFACE.into(),
         protocol: format!(
-            "mesh: {samples} area-weighted samples a mesh, ratio under {} cm",
+            "mesh: {samples} area-weighted samples per mesh, ratio under {} cm",
             threshold_m * 100.0
         ),
         samples,

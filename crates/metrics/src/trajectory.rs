@@ -75,6 +75,8 @@ impl ErrorSummary {
 /// Absolute trajectory error.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AteReport {
+    /// Id of the protocol, to compare by ([`crate::protocol`]).
+    pub protocol_id: String,
     /// What the figures mean.
     pub protocol: String,
     /// Number of pairs.
@@ -91,6 +93,8 @@ pub struct AteReport {
 /// Relative pose error from each pair to the one `delta` further on.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RpeReport {
+    /// Id of the protocol, to compare by ([`crate::protocol`]).
+    pub protocol_id: String,
     /// What the figures mean.
     pub protocol: String,
     /// Distance of the two poses compared, in pairs of the list.
@@ -178,6 +182,7 @@ pub fn ate(pairs: &[PosePair]) -> Result<AteReport, TrajectoryError> {
         ErrorSummary::of(&estimate.iter().zip(&truth).map(distance).collect::<Vec<_>>())
     };
     Ok(AteReport {
+        protocol_id: crate::protocol::ATE.into(),
         protocol: "ATE: translation, SE(3) Umeyama without scale, frames with finite truth".into(),
         pairs: pairs.len(),
         aligned_cm: errors_cm(&alignment.target_from_source),
@@ -206,6 +211,7 @@ pub fn rpe(pairs: &[PosePair], delta: usize) -> Result<RpeReport, TrajectoryErro
     let summary =
         |f: &dyn Fn(&Pose) -> f64| ErrorSummary::of(&errors.iter().map(f).collect::<Vec<_>>());
     Ok(RpeReport {
+        protocol_id: crate::protocol::rpe(delta),
         protocol: alloc::format!("RPE: relative motion over {delta} frame(s), no alignment"),
         delta,
         motions: errors.len(),

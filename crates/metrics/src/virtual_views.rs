@@ -151,6 +151,9 @@ pub fn depth_views(
 /// Depth L1 of a mesh by virtual views.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MeshDepthReport {
+    /// Id of the protocol, to compare by ([`crate::protocol`]); the caller names how the meshes were
+    /// culled and aligned.
+    pub protocol_id: String,
     /// What the figures mean; the caller adds how the meshes were culled and aligned.
     pub protocol: String,
     /// Views that count.
@@ -230,6 +233,7 @@ pub fn depth_l1(
     let of_all = |v: &ViewSums| (v.error_m + v.missing_m) / v.pixels as f64;
     let of_both = |v: &ViewSums| (v.both > 0).then(|| v.error_m / v.both as f64);
     Ok(MeshDepthReport {
+        protocol_id: crate::protocol::depth_virtual(views.wanted),
         protocol: format!(
             "Depth L1, mesh: both meshes in {} virtual views 500x500, f 300, far 20 m, inside the \
              true mesh's upright box x (0.3, 0.7, 0.7) + 0.4 m in z, views of unseen true points \

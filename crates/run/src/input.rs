@@ -34,8 +34,10 @@ impl<S: Sequence + ?Sized> Input for S {
 }
 
 /// Frames of a closure, such as a camera's: the next one, or `None` at the end. How many will come
-/// need not be known: [`SequenceInfo::frames`](mte_slam_types::frame::SequenceInfo::frames) may be 0. What is past cannot be read again, so such a
-/// run is resumed with another input, of frames that were kept.
+/// need not be known: [`SequenceInfo::frames`] may be 0. What is past cannot be read again, so
+/// such a run is resumed with another input, of frames that were kept.
+///
+/// [`SequenceInfo::frames`]: mte_slam_types::frame::SequenceInfo::frames
 pub struct Live<F> {
     next: F,
 }

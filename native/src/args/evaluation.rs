@@ -28,14 +28,14 @@ Figures and their protocols (in brackets their section in metrics.json and eval.
         [mesh]                    ESLAM's: a vertex is in a frame and no deeper than its measured
                                   depth plus 6 cm
         [mesh_frustum]            NICE-SLAM's: a vertex is in a frame's frustum (--cull frustum)
-                                  Both meshes are culled alike. 200,000 samples a mesh; point to
+                                  Both meshes are culled alike. 200,000 samples per mesh; point to
                                   point as the peers, beside it the floor that such sampling has
                                   and the exact distances to the surface. --icp aligns first
     depth L1, mesh [mesh_depth]   both meshes, culled as Co-SLAM's, in 1000 virtual views of 500x500,
                                   f 300, far 20 m, inside the true mesh's box times (0.3, 0.7, 0.7)
                                   + 0.4 m in z, views that hold unseen true points rejected, pixels
                                   0 < true < 19 m. Another figure than depth L1, views
-    time, memory [time, memory]   in metrics.json alone: median and 95th percentile a frame; without
+    time, memory [time, memory]   in metrics.json alone: median and 95th percentile per frame; without
                                   reading and decoding images, evaluation, and the last optimisation,
                                   which is given apart
 

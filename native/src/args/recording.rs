@@ -23,7 +23,7 @@ pub struct SelectionArgs {
     /// Scale the images, for example 0.5 for half the width and height.
     #[arg(long, value_name = "F", default_value = "1", value_parser = image_scale, help_heading = "Recording")]
     pub scale: f64,
-    /// The sensor, where the files do not tell or are wrong.
+    /// The sensor, where the files say nothing or are wrong.
     #[command(flatten)]
     pub sensor: SensorArgs,
     /// Labels: `none`, `dataset` (those of the recording, if any), or a folder of label images.
@@ -93,10 +93,10 @@ pub struct InspectArgs {
     /// Folder, .zip or .sens of the recording.
     #[arg(value_name = "DATASET", value_hint = ValueHint::AnyPath)]
     pub dataset: PathBuf,
-    /// Look at so many frames for ranges, holes and classes.
+    /// Number of frames that are examined for ranges, holes and classes.
     #[arg(long, value_name = "N", default_value = "40", value_parser = at_least_one)]
     pub look_at: usize,
-    /// Re-project so many frames into later ones.
+    /// Number of frames that are reprojected into later ones.
     #[arg(long, value_name = "N", default_value = "12", value_parser = at_least_one)]
     pub pairs: usize,
     /// Exit with 1 when there is any warning.

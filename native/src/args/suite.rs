@@ -34,10 +34,10 @@ over the seeds, published rows apart with their protocols, paths, error over\n  
 time, times, class maps, meshes coloured by error\n    \
 report.md          its tables\n    \
 results.json       every figure of every run with its protocol, and means over the seeds\n    \
-results.csv        the same, a line a figure\n    \
-runs/              a folder a run: run.toml (its inputs), log.txt, and all that `run` writes\n    \
+results.csv        the same, one line per figure\n    \
+runs/              one folder per run: run.toml (its inputs), log.txt, and all that `run` writes\n    \
 data/              the built-in recordings\n\n\
-Nothing is done twice: finished runs stay, interrupted ones go on, failed ones are tried again, and \
+Nothing is done twice: finished runs stay, interrupted ones continue, failed ones are tried again, and \
 the report is made from those that are there. Each run is one command that can be repeated blindly, \
 `mte-slam run --from runs/NAME/run.toml`, so other machines can share the work: --prepare writes \
 these files, native/workflows/ has a Snakemake workflow, and --report-only makes the report. Exit \
@@ -60,8 +60,8 @@ pub struct EvaluateArgs {
     /// Folder that the scenes' paths start from [default: $MTE_SLAM_DATA, else the suite's folder].
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub data: Option<PathBuf>,
-    /// Runs at a time. More than one shares the cores among them, which the times of the runs tell
-    /// of [default: 1 on a graphics adapter, else one for every 4 cores].
+    /// Runs at a time. More than one shares the cores among them, which lengthens the times of
+    /// each [default: 1 on a graphics adapter, else one per 4 cores].
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     pub jobs: Option<usize>,
     /// Check the suite, print its runs and how far each is, and do nothing.

@@ -1,7 +1,7 @@
 //! `mte-slam ablate`: the paper's Table VI on any labelled recording.
 //!
 //! All rows and seeds go through the same pieces as `run`, in this process, one after another. A
-//! finished run is kept in OUT/runs, so an interrupted ablation goes on where it ended.
+//! finished run is kept in OUT/runs, so an interrupted ablation continues where it ended.
 use crate::{
     args::{AblateArgs, AblationRow},
     class_truth::ClassTruth,
@@ -223,7 +223,7 @@ pub fn run(args: &AblateArgs, screen: Screen) -> Result<()> {
     Ok(())
 }
 
-/// Refuse what cannot be scored, before anything slow.
+/// Refuses what cannot be scored, before anything slow.
 fn check_labels(
     args: &AblateArgs,
     sequence: &mut dyn Sequence,

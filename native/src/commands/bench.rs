@@ -131,7 +131,7 @@ enum Kind {
     Suppressor,
 }
 
-/// Measure.
+/// Measures.
 pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
     let chosen = engine::start(&args.engine)?;
     screen.note(&chosen.note);

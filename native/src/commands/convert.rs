@@ -10,7 +10,7 @@ use mte_slam_dataset::{ColorFormat, RecordingWriter, ReplicaWriter, SensWriter, 
 use mte_slam_types::sequence::Sequence;
 use std::io::BufWriter;
 
-/// Write a recording in another layout.
+/// Writes a recording in another layout.
 pub fn run(args: &ConvertArgs, screen: Screen) -> Result<()> {
     let mut sequence = input::open(&args.dataset, &args.selection, screen)?;
     for text in sequence.warnings() {

@@ -1,6 +1,6 @@
 //! `mte-slam eval`: the figures again, from files alone.
 use crate::{
-    args::{ClassArgs, CullChoice, EvalArgs, MiouProtocol, SelectionArgs},
+    args::{ClassArgs, CullChoice, EvalArgs, InferenceChoice, MiouProtocol, SelectionArgs},
     class_truth::ClassTruth,
     evaluation::{self, ViewScores},
     input,
@@ -16,10 +16,11 @@ use crate::{
 };
 use anyhow::{Context, Result, anyhow, bail};
 use image::{ColorType, DynamicImage};
-use mte_slam_core::slam::View;
+use mte_slam_core::{config::Inference, slam::View};
 use mte_slam_mesh::read_ply;
 use mte_slam_metrics::PosePair;
 use mte_slam_odometry::ColorRegistration;
+use mte_slam_report::novel::{FOLDER as NOVEL_FOLDER, by_inference, sni as sni_frame};
 use mte_slam_types::{
     classes::{ClassTable, UNLABELLED},
     frame::SequenceInfo,
@@ -63,7 +64,7 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
     };
     let info = sequence.info().clone();
     let mut class_truth = input::open_truth(&args.dataset, &selection, &info)?;
-    let novel_folder = args.dataset.join(novel::FOLDER);
+    let novel_folder = args.dataset.join(NOVEL_FOLDER);
     let novel = match &args.novel {
         Some(path) => Some(path.as_path()),
         None => Some(novel_folder.as_path())
@@ -85,7 +86,7 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
     if sni || novel.is_some() || args.inference.is_some() {
         let mut slam = restore(out, &args.engine, screen)?;
         if sni {
-            novel::sni(&mut slam, sequence.as_mut(), &mut class_truth, &mut metrics)?;
+            sni_frame(&mut slam, sequence.as_mut(), &mut class_truth, &mut metrics)?;
         }
         if let Some(path) = novel {
             let aligned = truth_from_estimate;
@@ -93,9 +94,21 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
         }
         if let Some(choice) = args.inference {
             let truth = input::open_truth(&args.dataset, &selection, &info)?;
-            let sequence = sequence.as_mut();
-            let metrics = &mut metrics;
-            novel::by_inference(&mut slam, choice, sequence, truth, &rendered, metrics, screen)?;
+            let inference = match choice {
+                InferenceChoice::Anchors => Inference::Anchors,
+                InferenceChoice::Head => Inference::Head,
+            };
+            let mut progress = screen.progress("rendering again", rendered.len());
+            by_inference(
+                &mut slam,
+                inference,
+                sequence.as_mut(),
+                truth,
+                &rendered,
+                &mut metrics,
+                &mut |done| progress.set(done as u64, String::new),
+            )?;
+            progress.finish();
         }
     }
     let views = (registration, &rendered[..]);
@@ -115,8 +128,8 @@ pub fn run(args: &EvalArgs, screen: Screen) -> Result<()> {
             drop(bytes);
             let wanted = protocols(args);
             let sequence = sequence.as_mut();
-            let views =
-                mesh_evaluation::score(mesh, truth, sequence, &wanted, &mut metrics, screen);
+            screen.note("comparing the mesh with the true one");
+            let views = mesh_evaluation::score(mesh, truth, sequence, &wanted, &mut metrics);
             if let Some(path) = &args.write_views {
                 let views = views.ok_or_else(|| {
                     anyhow!("--write-views {}: the mesh was not judged in any", path.display())
@@ -145,7 +158,7 @@ fn protocols(args: &EvalArgs) -> MeshProtocols {
     }
 }
 
-/// Gives back what aligns the estimate with the truth; the identity where that is not known.
+/// Returns what aligns the estimate with the truth; the identity where that is not known.
 fn evaluate_trajectory(out: &Path, sequence: &dyn Sequence, metrics: &mut Metrics) -> Result<Pose> {
     let path = out.join("trajectory.txt");
     let name = path.display().to_string();
@@ -231,7 +244,7 @@ fn evaluate_renders(
     Ok(())
 }
 
-/// What the run's metrics.json says of its pictures, which alone do not tell which id has no meaning
+/// What the run's metrics.json says of its pictures, which alone do not say which id has no meaning
 /// where the map knew other classes than the true labels.
 fn recorded_renders(out: &Path) -> Option<serde_json::Value> {
     let text = std::fs::read_to_string(out.join("metrics.json")).ok()?;

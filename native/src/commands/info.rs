@@ -16,7 +16,7 @@ struct Adapter {
     missing: Vec<String>,
 }
 
-/// List adapters and engines.
+/// Lists adapters and engines.
 pub fn run(_args: &InfoArgs, screen: Screen) -> Result<()> {
     let adapters = adapters();
     let threads = std::thread::available_parallelism().map_or(1, usize::from);

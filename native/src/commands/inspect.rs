@@ -9,7 +9,7 @@ use std::fmt::Write;
 /// Classes that are listed; the rest is counted.
 const LISTED_CLASSES: usize = 8;
 
-/// Look at a recording and say what is there.
+/// Looks at a recording and say what is there.
 pub fn run(args: &InspectArgs, screen: Screen) -> Result<()> {
     let mut sequence = input::open(&args.dataset, &args.selection, screen)?;
     let options = InspectOptions { frames: args.look_at, pairs: args.pairs };

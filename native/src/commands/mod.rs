@@ -1,4 +1,4 @@
-//! One file a subcommand.
+//! One file per subcommand.
 pub mod ablate;
 pub mod bench;
 pub mod convert;

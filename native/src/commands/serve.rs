@@ -5,25 +5,14 @@ use crate::{
     screen::Screen,
     server::{Listening, Page, Service},
 };
-use anyhow::{Context, Result};
+use anyhow::Result;
+use mte_slam_dataset::stream::StreamInfo;
 
-/// Serve the page and a recording until the process ends.
+/// Serves the page and a recording until the process ends.
 pub fn run(args: &ServeArgs, screen: Screen) -> Result<()> {
     let sequence = input::open(&args.dataset, &args.selection, screen)?;
     let info = sequence.info().clone();
-    let truth: Vec<_> =
-        (0..info.frames).map(|i| sequence.truth(i).map(|p| p.to_row_major())).collect();
-    let answer = serde_json::json!({
-        "name": info.name,
-        "layout": info.layout,
-        "camera": info.camera,
-        "depth_unit_m": info.depth_unit_m,
-        "frames": info.frames,
-        "classes": info.classes,
-        "bounds": info.bounds,
-        "warnings": sequence.warnings(),
-        "truth": truth,
-    });
+    let description = StreamInfo::of(sequence.as_ref()).to_json()?;
     drop(sequence);
     let page = Page::find(args.page.as_deref());
     if !page.found() {
@@ -43,7 +32,7 @@ pub fn run(args: &ServeArgs, screen: Screen) -> Result<()> {
     let quiet = Screen { quiet: true, ..screen };
     let service = Service {
         page,
-        info: serde_json::to_vec(&answer).context("the recording cannot be described")?,
+        info: description,
         frames: info.frames,
         open: Box::new(move || input::open(&dataset, &selection, quiet)),
     };

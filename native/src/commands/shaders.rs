@@ -3,7 +3,7 @@ use crate::{args::ShadersArgs, output::folder::replace_file, screen::Screen};
 use anyhow::{Context, Result};
 use mte_slam_core::{kernels, shader};
 
-/// Write every composed shader to a folder.
+/// Writes every composed shader to a folder.
 pub fn run(args: &ShadersArgs, screen: Screen) -> Result<()> {
     // All are composed before the first is written.
     let mut shaders = Vec::new();

@@ -7,7 +7,7 @@ use crate::{
 use anyhow::Result;
 use mte_slam_synth::{SceneKind, SyntheticOptions};
 
-/// Write the built-in sequence to a folder.
+/// Writes the built-in sequence to a folder.
 pub fn run(args: &SynthArgs, screen: Screen) -> Result<()> {
     let scene = match args.scene {
         SceneChoice::Room => SceneKind::Room,

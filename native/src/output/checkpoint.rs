@@ -7,7 +7,7 @@ use std::{
     path::Path,
 };
 
-/// Read `OUT/checkpoint.safetensors`.
+/// Reads `OUT/checkpoint.safetensors`.
 pub fn read_file(path: &Path) -> Result<Checkpoint> {
     let bytes = std::fs::read(path).with_context(|| {
         format!("{}: cannot be read; is this the output folder of a finished run?", path.display())
@@ -16,7 +16,7 @@ pub fn read_file(path: &Path) -> Result<Checkpoint> {
         .with_context(|| format!("{}: not a whole checkpoint", path.display()))
 }
 
-/// Write a checkpoint so that, whatever happens, either the old file or the new one is there,
+/// Writes a checkpoint so that, whatever happens, either the old file or the new one is there,
 /// whole. Returns its size \[bytes\].
 pub fn write_file(path: &Path, checkpoint: &Checkpoint) -> Result<usize> {
     let temporary = path.with_extension("tmp");

@@ -5,16 +5,18 @@
 //! half a result nor a mixture of two: the staging folder, and an output folder that was made for
 //! the run, are removed on drop.
 use anyhow::{Context, Result, bail};
+use mte_slam_report::files::not_written;
+pub use mte_slam_report::files::replace_file;
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
 const STAGING: &str = ".partial";
-/// What an interrupted run goes on from.
-const RESUME: &str = crate::resume::FOLDER;
+/// What an interrupted run resumes from.
+const RESUME: &str = mte_slam_report::files::RESUME_FOLDER;
 /// Files that mark a folder as one of ours; results of a run that was killed while they were put in
-/// place lie beside what it goes on from.
+/// place lie beside what it resumes from.
 const MARKERS: [&str; 3] = ["metrics.json", "config.toml", RESUME];
 /// What a run writes, and therefore what a new run in the same folder takes away first, so that
 /// no file of the old run stays beside files of the new one. `metrics.json` is renamed last.
@@ -48,7 +50,7 @@ pub struct OutputFolder {
 }
 
 impl OutputFolder {
-    /// Prepare `path`: it must be absent, empty, or of an earlier run, unless `force` is given;
+    /// Prepares `path`: it must be absent, empty, or of an earlier run, unless `force` is given;
     /// and it must be writable.
     pub fn prepare(path: &Path, force: bool) -> Result<OutputFolder> {
         if path.exists() && !path.is_dir() {
@@ -102,7 +104,7 @@ impl OutputFolder {
         self.path.join(STAGING)
     }
 
-    /// Stage a file; `name` may hold one folder, `renders/000000.color.png`.
+    /// Stages a file; `name` may hold one folder, `renders/000000.color.png`.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
         let target = self.staging().join(name);
         if let Some(parent) = target.parent() {
@@ -111,7 +113,7 @@ impl OutputFolder {
         fs::write(&target, bytes).with_context(|| not_written(&self.path.join(name)))
     }
 
-    /// Move everything staged into place, replacing what an earlier run left.
+    /// Moves everything staged into place, replacing what an earlier run left.
     pub fn publish(mut self) -> Result<()> {
         let staged = sorted_entries(&self.staging())?;
         for name in OURS {
@@ -153,21 +155,6 @@ impl Drop for OutputFolder {
     }
 }
 
-/// Write one file of an existing folder: to a temporary name first, then renamed.
-pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<()> {
-    let mut temporary = path.as_os_str().to_owned();
-    temporary.push(".tmp");
-    let temporary = PathBuf::from(temporary);
-    if let Some(parent) = path.parent() {
-        fs::create_dir_all(parent).with_context(|| not_written(path))?;
-    }
-    let written = fs::write(&temporary, bytes).and_then(|()| fs::rename(&temporary, path));
-    if written.is_err() {
-        let _ = fs::remove_file(&temporary);
-    }
-    written.with_context(|| not_written(path))
-}
-
 fn sorted_entries(folder: &Path) -> Result<Vec<String>> {
     let mut names = Vec::new();
     for entry in fs::read_dir(folder).with_context(|| unwritable(folder))? {
@@ -189,10 +176,6 @@ fn unwritable(path: &Path) -> String {
         "{}: the output folder cannot be written; choose another with --out or change its rights",
         path.display()
     )
-}
-
-fn not_written(path: &Path) -> String {
-    format!("{}: cannot be written (disk full, or no right to?)", path.display())
 }
 
 #[cfg(test)]

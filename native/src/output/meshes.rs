@@ -1,11 +1,11 @@
 //! Mesh files.
-use super::pictures::unlabelled_id;
 use anyhow::{Context, Result};
 use mte_slam_mesh::{Mesh, write_glb, write_glb_by_class, write_ply, write_ply_by_class};
+use mte_slam_report::draw::pictures::unlabelled_id;
 use mte_slam_types::classes::ClassTable;
 
 /// `mesh.ply` and `mesh.glb` with colours and, with classes, `mesh_semantic.ply` (the classes'
-/// colours and raw ids) and `mesh_semantic.glb` (a material a class), given to `write` with their
+/// colours and raw ids) and `mesh_semantic.glb` (one material per class), given to `write` with their
 /// names.
 pub fn write(
     mesh: &Mesh,

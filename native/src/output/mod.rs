@@ -1,16 +1,11 @@
-//! Everything the program writes.
-pub mod ablation;
+//! The output folder, and the files in it that are not figures or pictures.
 pub mod checkpoint;
-pub mod classes;
-pub mod colormap;
 pub mod folder;
-pub mod font;
 pub mod meshes;
-pub mod metrics;
-pub mod metrics_line;
 pub mod new_folder;
-pub mod pictures;
-pub mod plot;
-pub mod sheet;
-pub mod timings;
-pub mod trajectory;
+
+pub use mte_slam_report::{
+    ablation,
+    draw::{classes, pictures, plot, sheet},
+    metrics, metrics_line, timings, trajectory,
+};

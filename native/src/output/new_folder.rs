@@ -37,7 +37,7 @@ impl NewFolder {
         Ok(folder)
     }
 
-    /// Write a file; `name` may hold folders.
+    /// Writes a file; `name` may hold folders.
     pub fn write(&self, name: &str, bytes: &[u8]) -> io::Result<()> {
         let path = self.staging.join(name);
         if let Some(parent) = path.parent() {
@@ -46,12 +46,12 @@ impl NewFolder {
         fs::write(path, bytes)
     }
 
-    /// Start a file that is too large to be written at once.
+    /// Starts a file that is too large to be written at once.
     pub fn create(&self, name: &str) -> io::Result<fs::File> {
         fs::File::create(self.staging.join(name))
     }
 
-    /// Put everything in its place.
+    /// Puts everything in its place.
     pub fn publish(self) -> Result<()> {
         // An empty folder in its place gives way (renaming over one is not portable).
         let _ = fs::remove_dir(&self.dir);

@@ -47,18 +47,6 @@ fn a_lost_device_names_the_checkpoint() {
     assert!(!error.downcast_ref::<Interrupted>().expect("a typed error").device);
 }
 
-#[test]
-fn the_short_form_is_told_from_the_whole_command() {
-    let of = |text: &str| Invocation {
-        arguments: text.split(' ').map(str::to_owned).collect(),
-        folder: PathBuf::new(),
-    };
-    assert_eq!(of("run --resume out").only_resumes(), Some("out"));
-    assert_eq!(of("-q run --resume=out --json").only_resumes(), Some("out"));
-    assert_eq!(of("run --resume out --engine cpu").only_resumes(), None);
-    assert_eq!(of("run room --resume").only_resumes(), None);
-}
-
 /// The graphics engine, or `None` with a message where there is no adapter.
 fn gpu() -> Option<StartedEngine> {
     match engine::start(&EngineArgs { engine: EngineChoice::Gpu, adapter: None }) {
@@ -143,7 +131,7 @@ fn a_device_lost_in_the_middle_leaves_a_run_to_go_on_with() {
     record.set_engine(
         &engine::start(&EngineArgs { engine: EngineChoice::Cpu, adapter: None }).unwrap().record,
     );
-    let resumed = saved.resume(Engine::cpu(), &config, &mut sequence, &record, &mut terminal);
+    let resumed = saved.resume(Engine::cpu(), &config, &mut sequence, &record);
     let mut run = resumed.unwrap();
     steps::take_all(&mut run, &mut sequence, "room", None, &mut terminal).unwrap();
     let (slam, log) = run.into_parts();

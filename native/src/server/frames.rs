@@ -1,11 +1,7 @@
-//! Frames as bytes, one after the other, decoded only when somebody reads on: that is the
+//! Frames as bytes ([`stream`]), one after the other, decoded only when somebody reads on: that is the
 //! back-pressure.
-//!
-//! A frame is: length of the header (u32, little endian), the header (JSON: `index`, `number`,
-//! `time_s`, `labels`), colour (RGB, 3 bytes a pixel), depth (u16, little endian), and with labels
-//! compact classes (1 byte a pixel). In place of a frame that cannot be read: a header with `error`.
-use mte_slam_types::{frame::Frame, sequence::Sequence};
-use serde_json::json;
+use mte_slam_dataset::stream;
+use mte_slam_types::sequence::Sequence;
 use std::io::{self, Read};
 
 /// Reads a sequence as bytes.
@@ -36,11 +32,11 @@ impl Read for FrameReader {
             self.sent = 0;
             match self.sequence.frame(self.next) {
                 Ok(frame) => {
-                    encode(&frame, &mut self.bytes);
+                    stream::write_frame(&frame, &mut self.bytes);
                     self.next += 1;
                 }
                 Err(e) => {
-                    push_header(&json!({ "error": e.to_string() }), &mut self.bytes);
+                    stream::write_failure(e.to_string(), &mut self.bytes);
                     self.next = self.frames;
                 }
             }
@@ -52,30 +48,15 @@ impl Read for FrameReader {
     }
 }
 
-fn push_header(header: &serde_json::Value, bytes: &mut Vec<u8>) {
-    let text = header.to_string();
-    bytes.extend_from_slice(&(text.len() as u32).to_le_bytes());
-    bytes.extend_from_slice(text.as_bytes());
-}
-
-fn encode(frame: &Frame, bytes: &mut Vec<u8>) {
-    let header = json!({
-        "index": frame.index,
-        "number": frame.number,
-        "time_s": frame.time_s,
-        "labels": frame.labels.is_some(),
-    });
-    push_header(&header, bytes);
-    bytes.extend_from_slice(frame.color.as_flattened());
-    bytes.extend(frame.depth.iter().flat_map(|d| d.to_le_bytes()));
-    bytes.extend(frame.labels.iter().flatten());
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use mte_slam_synth::{SyntheticOptions, SyntheticSequence};
-    use mte_slam_types::{frame::SequenceInfo, pose::Pose, sequence::SequenceError};
+    use mte_slam_types::{
+        frame::{Frame, SequenceInfo},
+        pose::Pose,
+        sequence::SequenceError,
+    };
     use std::{cell::Cell, rc::Rc};
 
     /// Counts the frames that were asked for, and fails from one on.

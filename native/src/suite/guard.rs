@@ -25,7 +25,7 @@ pub struct Guard {
 }
 
 impl Guard {
-    /// Take the folder; waits a moment where the last start has not said that it ended.
+    /// Takes the folder; waits a moment where the last start has not said that it ended.
     pub fn take(folder: &Path) -> Result<Guard> {
         let path = folder.join(NAME);
         let name = path.display();
@@ -47,7 +47,7 @@ impl Guard {
             let mut n = 0;
             while let Err(RecvTimeoutError::Timeout) = stopped.recv_timeout(BEAT) {
                 n += 1;
-                // A full disk is the runs' to tell.
+                // A full disk is reported by the runs.
                 let _ = beat(&file, n);
             }
         });

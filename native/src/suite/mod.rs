@@ -1,8 +1,6 @@
-//! Suites: many runs over scenes, seeds, presets and ablations.
-pub mod file;
+//! The runs of a suite as child processes of this program, and their options as its flags.
 pub mod guard;
 pub mod options;
-pub mod plan;
 pub mod process;
-pub mod published;
+pub mod program;
 pub mod run_file;

@@ -3,7 +3,7 @@
 //! What there is, is asked of the command line itself, so a new flag of `run` is a new key here.
 use crate::{
     args::{Cli, Command, RunArgs},
-    errors::usage,
+    errors::{UsageError, usage},
 };
 use anyhow::{Result, anyhow};
 use clap::{ArgAction, CommandFactory, Parser};
@@ -13,31 +13,6 @@ use toml::{Table, Value};
 
 /// What a file of one run decides by itself, and not by these keys.
 const DECIDED: [&str; 6] = ["out", "force", "resume", "from", "config", "help"];
-
-/// Keys whose values are files or folders, and the words that may stand there instead.
-const PATHS: [(&str, &[&str]); 5] = [
-    ("mesh", &[]),
-    ("labels", &["none", "dataset"]),
-    ("truth_labels", &["none", "dataset"]),
-    ("features", &[]),
-    ("classes", &["nyu40", "replica"]),
-];
-
-/// The path that an option holds, if it is one that holds a path.
-pub fn path_of<'a>(key: &str, value: &'a Value) -> Option<&'a Path> {
-    let (_, words) = PATHS.iter().find(|(name, _)| *name == key)?;
-    let text = value.as_str()?;
-    (!words.contains(&text)).then_some(Path::new(text))
-}
-
-/// Relative paths among the options start from `folder` from now on.
-pub fn resolve_paths(options: &mut Table, folder: &Path) {
-    for (key, value) in options.iter_mut() {
-        if let Some(path) = path_of(key, value) {
-            *value = Value::String(folder.join(path).display().to_string());
-        }
-    }
-}
 
 /// The options as arguments of `run`; `place` (a file and, in it, a table) starts the messages.
 pub fn arguments(options: &Table, place: &str) -> Result<Vec<String>> {
@@ -66,9 +41,7 @@ pub fn arguments(options: &Table, place: &str) -> Result<Vec<String>> {
         let takes_value = flag.get_action().takes_values();
         let wrong = |expected: &str| {
             let kind = value.type_str();
-            Err(crate::errors::UsageError(format!(
-                "{place}: {key}: found {kind} {value}, expected {expected}"
-            )))
+            Err(UsageError(format!("{place}: {key}: found {kind} {value}, expected {expected}")))
         };
         match value {
             Value::Boolean(given) if !takes_value => {
@@ -164,16 +137,5 @@ mod tests {
         assert!(m.contains("found integer 1, expected true or false"), "{m}");
         assert!(message("engine = 'tpu'").contains("auto, gpu, cpu"));
         assert!(message("frames = [[1]]").contains("expected"));
-    }
-
-    #[test]
-    fn paths_start_from_the_folder_given() {
-        let mut options = table("mesh = 'a/b.ply'\nlabels = 'none'\nfeatures = '/abs'\nframes = 1");
-        resolve_paths(&mut options, Path::new("/root"));
-        assert_eq!(options["mesh"].as_str(), Some("/root/a/b.ply"));
-        assert_eq!(
-            (options["labels"].as_str(), options["features"].as_str()),
-            (Some("none"), Some("/abs"))
-        );
     }
 }

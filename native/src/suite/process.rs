@@ -3,12 +3,15 @@
 //! A run that ends in a crash, or that the system ends for want of memory, takes nothing else with
 //! it; and runs do not outlive the suite: each holds one end of a pipe, and ends when the other end
 //! is gone, however this process came to its end.
-use super::{
-    plan::{FAILURE, Run},
-    run_file,
-};
-use crate::{output::folder::replace_file, progress::Progress};
+use crate::progress::Progress;
 use anyhow::{Context, Result};
+use mte_slam_report::{
+    files::replace_file,
+    suite::{
+        plan::{FAILURE, Run, STARTED},
+        run_file,
+    },
+};
 use std::{
     collections::VecDeque,
     fs,
@@ -22,12 +25,10 @@ use std::{
 pub const TIED: &str = "MTE_SLAM_TIED";
 /// What a run has said, in its folder.
 pub const LOG: &str = "log.txt";
-/// How a run was started, in its folder.
-pub const STARTED: &str = "started.json";
 /// How often children are looked at.
 const PAUSE: Duration = Duration::from_millis(100);
 
-/// End this process when its standard input ends, if it was started as a part of a suite.
+/// Ends this process when its standard input ends, if it was started as a part of a suite.
 pub fn end_with_parent() {
     if std::env::var_os(TIED).is_none() {
         return;
@@ -42,7 +43,7 @@ pub fn end_with_parent() {
 }
 
 /// How one run ended.
-pub struct Ended {
+pub struct RunOutcome {
     /// Why it failed, if it did.
     pub failure: Option<String>,
     /// How long it took.
@@ -57,12 +58,12 @@ struct Running<'a> {
     log_start: u64,
 }
 
-/// Do the runs, `jobs` at a time, in order; `ended` hears of each, with how many are done.
+/// Makes the runs, `jobs` at a time, in order; `ended` receives each outcome, with how many are done.
 pub fn run_all(
     runs: &[&Run],
     jobs: usize,
     progress: &mut Progress,
-    ended: &mut dyn FnMut(&Run, &Ended, usize, &Progress),
+    ended: &mut dyn FnMut(&Run, &RunOutcome, usize, &Progress),
 ) -> Result<()> {
     let program = std::env::current_exe().context("this program cannot be found again")?;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -81,7 +82,7 @@ pub fn run_all(
                 Err(error) => {
                     done += 1;
                     let failure = Some(format!("{error:#}"));
-                    ended(run, &Ended { failure, time: Duration::ZERO }, done, progress);
+                    ended(run, &RunOutcome { failure, time: Duration::ZERO }, done, progress);
                 }
             }
         }
@@ -104,7 +105,7 @@ pub fn run_all(
             let Running { run, begin, .. } = running.swap_remove(i);
             note_failure(run, failure.as_deref());
             done += 1;
-            ended(run, &Ended { failure, time: begin.elapsed() }, done, progress);
+            ended(run, &RunOutcome { failure, time: begin.elapsed() }, done, progress);
         }
         if progress.wants_message(done as u64) {
             progress.set(done as u64, || message(&running));
@@ -159,7 +160,7 @@ fn new_log(running: &Running) -> Option<String> {
     Some(String::from_utf8_lossy(&bytes).into_owned())
 }
 
-/// For the report of a later start. What cannot be written is told on the screen anyway.
+/// For the report of a later start. What cannot be written is on the screen anyway.
 fn note_failure(run: &Run, failure: Option<&str>) {
     let path = run.folder.join(FAILURE);
     let _ = match failure {

@@ -1,5 +1,6 @@
 //! `mte-slam serve` as a browser meets it: what is answered, and what is refused.
 use crate::program::*;
+use mte_slam_dataset::stream::{FrameDecoder, StreamInfo};
 use serde_json::Value;
 use std::{
     io::{BufRead, BufReader, Read, Write},
@@ -92,29 +93,20 @@ fn a_recording_is_described_and_streamed_from_any_frame() {
     let (status, head, info) = serving.get("/api/info");
     assert_eq!(status, 200);
     assert!(head.contains("application/json") && head.contains("nosniff"), "{head}");
-    let info: Value = serde_json::from_slice(&info).unwrap();
-    assert_eq!(
-        (info["frames"].as_u64(), info["camera"]["width"].as_u64()),
-        (Some(FRAMES), Some(32))
-    );
-    assert_eq!(info["truth"].as_array().unwrap().len(), FRAMES as usize);
+    let info = StreamInfo::from_json(&info).unwrap();
+    assert_eq!((info.frames as u64, info.camera.width), (FRAMES, 32));
+    assert_eq!(info.truth.len(), FRAMES as usize);
 
     let (status, _, stream) = serving.get("/api/stream?from=3");
     assert_eq!(status, 200);
-    let mut rest = stream.as_slice();
+    let mut decoder = FrameDecoder::new(PIXELS);
+    decoder.push(&stream);
     for index in 3..FRAMES {
-        let (length, tail) = rest.split_first_chunk::<4>().unwrap();
-        let (header, tail) = tail.split_at(u32::from_le_bytes(*length) as usize);
-        let header: Value = serde_json::from_slice(header).unwrap();
-        assert_eq!(
-            (header["index"].as_u64(), header["labels"].as_bool()),
-            (Some(index), Some(true))
-        );
-        let (color, tail) = tail.split_at(3 * PIXELS);
-        assert!(color.iter().any(|c| *c > 0));
-        rest = &tail[3 * PIXELS..];
+        let frame = decoder.next_frame().unwrap().unwrap();
+        assert_eq!((frame.index as u64, frame.labels.is_some()), (index, true));
+        assert!(frame.color.as_flattened().iter().any(|c| *c > 0));
     }
-    assert!(rest.is_empty());
+    decoder.finish().unwrap();
 }
 
 #[test]

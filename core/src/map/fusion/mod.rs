@@ -129,7 +129,7 @@ impl Fusion {
     }
 
     /// Parameters that training moves: no padding, nor layers that the configuration leaves out.
-    pub fn trained_count(&self) -> usize {
+    pub(crate) fn trained_count(&self) -> usize {
         let used = self.layers.iter().filter(|l| l.used(&self.config));
         used.map(|layer| {
             let l = &layer.shape;

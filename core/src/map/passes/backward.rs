@@ -71,7 +71,12 @@ pub fn record_backward(r: &mut Commands, map: &Map, scratch: &Scratch, b: &Batch
 }
 
 /// Gradients of the semantics alone: what [`record_semantic_step`](super::record_semantic_step) needs.
-pub fn record_semantic_backward(r: &mut Commands, map: &Map, scratch: &Scratch, b: &Batch<'_>) {
+pub(crate) fn record_semantic_backward(
+    r: &mut Commands,
+    map: &Map,
+    scratch: &Scratch,
+    b: &Batch<'_>,
+) {
     if map.sample_head.is_some() {
         sample_head::record_backward(r, map, scratch, &map.params(b));
     } else {

@@ -8,7 +8,7 @@ use crate::{
         query_points,
         shared::{FLAG_ANCHORS, FLAG_MAP},
     },
-    map::{Map, QUERY_POINTS_MAX, Scratch, sample_head},
+    map::{Map, Scratch, sample_head, scratch::QUERY_POINTS_MAX},
     pose::Pose,
 };
 use alloc::vec::Vec;
@@ -58,7 +58,7 @@ pub async fn align(
 ///
 /// # Errors
 /// Engine failures.
-pub async fn query_distances(
+pub(crate) async fn query_distances(
     engine: &mut Engine,
     map: &Map,
     scratch: &Scratch,
@@ -72,7 +72,7 @@ pub async fn query_distances(
 ///
 /// # Errors
 /// Engine failures.
-pub async fn query_surface(
+pub(crate) async fn query_surface(
     engine: &mut Engine,
     map: &Map,
     scratch: &Scratch,

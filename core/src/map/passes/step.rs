@@ -77,7 +77,7 @@ pub fn record_step(
 
 /// As [`record_step`], of the semantic planes, their decoder and the class head. The
 /// batch's weight of colour must be 0.
-pub fn record_semantic_step(
+pub(crate) fn record_semantic_step(
     r: &mut Commands,
     map: &mut Map,
     scratch: &Scratch,

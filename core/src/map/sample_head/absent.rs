@@ -17,7 +17,7 @@ pub struct SampleHead {
 }
 
 /// Activations and gradients of the head, which this build does not have.
-pub struct SampleScratch {
+pub(crate) struct SampleScratch {
     _never: Infallible,
 }
 

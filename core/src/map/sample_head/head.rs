@@ -50,7 +50,7 @@ pub struct SampleHead {
 }
 
 /// Activations and gradients of the head.
-pub struct SampleScratch {
+pub(crate) struct SampleScratch {
     pub(super) features: Buffer<[f32; 4]>,
     pub(super) feature_gradient: Buffer<[f32; 4]>,
     pub(super) slot_depths: Buffer<f32>,

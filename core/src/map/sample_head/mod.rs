@@ -14,11 +14,15 @@ mod passes;
 mod absent;
 
 #[cfg(feature = "sample-head")]
-pub use head::{SampleHead, SampleLayer, SampleScratch};
+pub(crate) use head::SampleScratch;
+#[cfg(feature = "sample-head")]
+pub use head::{SampleHead, SampleLayer};
 #[cfg(feature = "sample-head")]
 pub(super) use passes::{classes_at, record_backward, record_classes, record_step};
 
 #[cfg(not(feature = "sample-head"))]
-pub use absent::{SampleHead, SampleScratch};
+pub use absent::SampleHead;
+#[cfg(not(feature = "sample-head"))]
+pub(crate) use absent::SampleScratch;
 #[cfg(not(feature = "sample-head"))]
 pub(super) use absent::{classes_at, record_backward, record_classes, record_step};
