@@ -1,6 +1,6 @@
 #!/bin/sh
-# Every check of the project, on Linux, macOS and Windows (Git Bash): format, lints, documentation,
-# features, packages, the builds for a microcontroller (no_std) and for the browser, and all tests.
+# Every check of the project, on Linux, macOS and Windows (Git Bash): format, lints, packages, features,
+# documentation, the builds for a microcontroller (no_std) and for the browser, and all tests.
 #
 #   scripts/test.sh         everything
 #   scripts/test.sh quick   before a commit: format, lints, unit tests, the kernels' twins on the CPU,
@@ -43,10 +43,10 @@ finish() {
     step ""
     echo "== all checks passed in $(($(date +%s) - started)) s"
 }
-web_build=
+aside=
 # shellcheck disable=SC2154  # status is set in the trap itself
 trap 'status=$?
-    if [ -n "$web_build" ]; then kill "$web_build" 2>/dev/null || true; fi
+    if [ -n "$aside" ]; then kill "$aside" 2>/dev/null || true; fi
     if [ $status -ne 0 ]; then echo "== ${current:-start}: FAILED" >&2; fi' EXIT
 
 step "format"
@@ -89,23 +89,41 @@ if [ "$what" = quick ]; then
     exit 0
 fi
 
-step "documentation"
-RUSTDOCFLAGS="${RUSTDOCFLAGS:-} -Dwarnings" cargo doc --locked --no-deps --workspace
-
-step "features and packages"
+step "packages"
+have_python=0
 if python3 -c '' 2>/dev/null; then
-    python3 scripts/features.py
+    have_python=1
     python3 scripts/packages.py
 elif [ "${MTE_SLAM_REQUIRE_PYTHON:-0}" = 1 ]; then
     echo "no python3" >&2
     exit 1
 else
-    echo "SKIPPED: no python3"
+    echo "SKIPPED: the checks of packages and features; there is no python3."
 fi
 
 step "compiler for no_std and wasm32"
 cross=0
 setup=$(sh ./scripts/wasm-toolchain.sh) || cross=$?
+if [ $cross -eq 3 ] && [ "${MTE_SLAM_REQUIRE_TARGETS:-0}" != 1 ]; then
+    echo "SKIPPED: the no_std and wasm32 builds. Neither rustup nor Debian's packages provide" \
+        "their targets here; 'rustup target add wasm32-unknown-unknown thumbv7em-none-eabi' does."
+elif [ $cross -ne 0 ]; then
+    echo "no compiler for thumbv7em-none-eabi and wasm32-unknown-unknown (status $cross)" >&2
+    exit 1
+fi
+
+# Beside the steps that follow, in folders of their own: one crate after the other, and linking the
+# browser's module, take one core for long, while tests leave one idle now and then.
+aside() {
+    if [ $have_python -eq 1 ]; then CARGO_TARGET_DIR=$target/features python3 scripts/features.py; fi
+    if [ $cross -eq 0 ]; then ./scripts/test-web.sh build; fi
+}
+aside >"$target/aside.log" 2>&1 &
+aside=$!
+
+step "documentation"
+RUSTDOCFLAGS="${RUSTDOCFLAGS:-} -Dwarnings" cargo doc --locked --no-deps --workspace
+
 if [ $cross -eq 0 ]; then
     step "no_std for thumbv7em-none-eabi, and wasm32"
     (
@@ -114,15 +132,6 @@ if [ $cross -eq 0 ]; then
             --no-default-features --target thumbv7em-none-eabi
         cargo check --locked -p mte-slam-web --target wasm32-unknown-unknown
     )
-    # Linking the browser's module takes one core for long, tests leave one idle now and then.
-    ./scripts/test-web.sh build >"$target/web-build.log" 2>&1 &
-    web_build=$!
-elif [ $cross -eq 3 ] && [ "${MTE_SLAM_REQUIRE_TARGETS:-0}" != 1 ]; then
-    echo "SKIPPED: the no_std and wasm32 builds. Neither rustup nor Debian's packages provide" \
-        "their targets here; 'rustup target add wasm32-unknown-unknown thumbv7em-none-eabi' does."
-else
-    echo "no compiler for thumbv7em-none-eabi and wasm32-unknown-unknown (status $cross)" >&2
-    exit 1
 fi
 
 # Their targets are not run here, but kept in order; scripts/fuzz.sh runs them.
@@ -141,13 +150,14 @@ cargo test --locked --workspace --no-fail-fast
 step "workflow"
 ./scripts/test-workflow.sh
 
+step "features, and the build for a browser"
+built=0
+wait "$aside" || built=$?
+aside=
+cat "$target/aside.log"
+[ $built -eq 0 ] || exit 1
+
 if [ $cross -eq 0 ]; then
-    step "build for a browser"
-    built=0
-    wait "$web_build" || built=$?
-    web_build=
-    cat "$target/web-build.log"
-    [ $built -eq 0 ] || exit 1
     step "tests in a browser"
     ./scripts/test-web.sh run
 fi

@@ -114,7 +114,7 @@ fn a_device_lost_in_the_middle_leaves_a_run_to_go_on_with() {
     let mut progress = quiet.progress("", FRAMES);
     let mut terminal = Terminal::new(&mut progress, &sequence);
     let error = steps::take_all(&mut run, &mut sequence, "room", Some(&mut saver), &mut terminal);
-    let error = saver.failed(error.err().expect("the device is gone"));
+    let error = saver.failed(error.expect_err("the device is gone"));
     let kind = error.downcast_ref::<Interrupted>().expect("a typed error");
     assert!(kind.device && kind.frames == Some(4), "{error:#}");
     let is_loss = |cause: &(dyn std::error::Error + 'static)| {
