@@ -3,6 +3,8 @@
 mod live_camera;
 #[path = "map_a_room.rs"]
 mod map_a_room;
+#[path = "own_kernel.rs"]
+mod own_kernel;
 #[path = "own_source.rs"]
 mod own_source;
 
@@ -32,6 +34,11 @@ fn a_live_camera_is_located_until_it_ends() {
         let gap_m = p.world_from_camera.translation.distance(truth.translation);
         assert!(gap_m < 0.02, "frame {}: {gap_m} m", p.frame);
     }
+}
+
+#[test]
+fn a_kernel_of_ones_own_runs_on_both_engines() {
+    own_kernel::own_kernel().unwrap();
 }
 
 #[test]

@@ -53,7 +53,7 @@ export interface Overrides {
   "loss.color"?: number;
   /** Cross-entropy of the rendered classes. Default 0.1; at least 0. */
   "loss.semantic"?: number;
-  /** Exponent of the inverse frequency that weighs classes in it: 0 as they come, 1 balanced. Default 0.25; 0 to 1. */
+  /** Exponent of the inverse frequency that weighs classes in it: 0 as they come, 1 balanced. Default 0.25; 0 to 4. */
   "loss.balance"?: number;
   /** Share that the loss takes back of how much likelier those weights, and rays that seek rare classes, make a class (logit adjustment): 0 nothing, 1 all. Default 0.5; 0 to 1. */
   "loss.adjustment"?: number;
@@ -89,7 +89,7 @@ export interface Overrides {
   "tracking.render_loss.color"?: number;
   /** Cross-entropy of the rendered classes. Default 0; at least 0. */
   "tracking.render_loss.semantic"?: number;
-  /** Exponent of the inverse frequency that weighs classes in it: 0 as they come, 1 balanced. Default 0; 0 to 1. */
+  /** Exponent of the inverse frequency that weighs classes in it: 0 as they come, 1 balanced. Default 0; 0 to 4. */
   "tracking.render_loss.balance"?: number;
   /** Share that the loss takes back of how much likelier those weights, and rays that seek rare classes, make a class (logit adjustment): 0 nothing, 1 all. Default 0; 0 to 1. */
   "tracking.render_loss.adjustment"?: number;
@@ -155,7 +155,7 @@ export interface Overrides {
   "fusion.weight_class"?: number;
   /** Weight of the color loss at the fused features. Default 0.5; at least 0. */
   "fusion.weight_color"?: number;
-  /** Exponent of the inverse frequency that weighs classes: 0 as they come, 1 balanced. Default 0.5; 0 to 1. */
+  /** Exponent of the inverse frequency that weighs classes: 0 as they come, 1 balanced. Default 0.5; 0 to 4. */
   "fusion.balance"?: number;
   /** Weight of the feature loss: rays against the fused feature of their pixel. Default 0; at least 0. */
   "fusion.weight"?: number;

@@ -124,7 +124,7 @@ mte_slam_types::settings! {
         semantic: f64 = 0.1, AtLeast(0.0);
         /// Exponent of the inverse frequency that weighs classes in it: 0 as they come, 1
         /// balanced.
-        balance: f64 = 0.25, Between(0.0, 1.0);
+        balance: f64 = 0.25, Between(0.0, 4.0);
         /// Share that the loss takes back of how much likelier those weights, and rays that seek
         /// rare classes, make a class (logit adjustment): 0 nothing, 1 all.
         adjustment: f64 = 0.5, Between(0.0, 1.0);

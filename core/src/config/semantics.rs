@@ -64,7 +64,7 @@ mte_slam_types::settings! {
         /// Weight of the color loss at the fused features.
         weight_color: f64 = 0.5, AtLeast(0.0);
         /// Exponent of the inverse frequency that weighs classes: 0 as they come, 1 balanced.
-        balance: f64 = 0.5, Between(0.0, 1.0);
+        balance: f64 = 0.5, Between(0.0, 4.0);
         /// Weight of the feature loss: rays against the fused feature of their pixel.
         weight: f64 = 0.0, AtLeast(0.0);
         /// The same while the semantics are trained alone, at the end.
