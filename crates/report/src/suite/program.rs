@@ -55,13 +55,14 @@ pub(crate) mod tests {
         }
 
         fn check_options(&self, options: &Table, place: &str) -> Result<()> {
-            const KNOWN: [&str; 10] = [
+            const KNOWN: [&str; 11] = [
                 "classes",
                 "engine",
                 "frames",
                 "labels",
                 "mesh",
                 "mesh_resolution",
+                "mesh_views",
                 "render_every",
                 "scale",
                 "set",

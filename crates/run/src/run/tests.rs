@@ -114,9 +114,9 @@ fn a_host_follows_a_run_in_order() {
     let log = plain.log();
     assert_eq!(log.frames.len(), FRAMES);
     for (i, frame) in log.frames.iter().enumerate() {
-        // Every second frame is mapped.
-        assert_eq!(frame.losses.is_some(), i % 2 == 0, "frame {i}");
-        assert_eq!(frame.mapping_s > 0.0, i % 2 == 0, "frame {i}");
+        // Every second frame is mapped, and one that the odometry takes for a keyframe.
+        assert!(frame.losses.is_some() || i % 2 == 1, "frame {i}");
+        assert_eq!(frame.mapping_s > 0.0, frame.losses.is_some(), "frame {i}");
     }
     assert!(log.finish_s > 0.0 && plain.is_finished());
     // A run that is complete does nothing more.
