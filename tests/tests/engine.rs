@@ -280,7 +280,7 @@ fn broken_shaders_are_typed_errors_and_the_engine_survives() {
     let mut commands = Commands::new();
     commands.dispatch(&UNKNOWN, &(), &[], [1, 1, 1]);
     let error = engine.submit(&commands).unwrap_err();
-    assert!(error.to_string().contains("unknown.wgsl line 1: unknown name NOPE"), "{error}");
+    assert!(error.to_string().contains("unknown.wgsl line 2: unknown name NOPE"), "{error}");
     if let Engine::Gpu(engine) = &mut engine {
         let error = block_on(engine.precompile(&[&AFFINE, &BROKEN])).unwrap_err();
         assert!(error.to_string().contains("kernel broken"), "{error}");
