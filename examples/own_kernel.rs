@@ -1,6 +1,7 @@
 //! A kernel of one's own, declared outside of the crates: a shader, its twin in Rust, and one
 //! declaration that both and every call share. It runs on the processor, and with the feature `gpu`
 //! on a graphics adapter too; the results must agree to a few units of the last place.
+//! A program that declares kernels depends on `bytemuck` (with its feature `derive`), too.
 //!
 //! ```text
 //! cargo run --release -p mte-slam-examples --example own_kernel

@@ -76,8 +76,9 @@ tests() {
 }
 
 run() {
-    cargo build --locked -p mte-slam
-    cargo run --locked --quiet -p mte-slam-tests --example kernel_outputs -- "$target/kernel_outputs.bin"
+    # As the tests build them: one crate alone has other features, and would compile everything anew.
+    cargo test --locked --workspace --no-run
+    "$target/debug/examples/kernel_outputs" "$target/kernel_outputs.bin"
     named="consistency failures package page resume sources tarball trajectories"
     found=$(cd www/test && echo *.test.mjs | sed 's/\.test\.mjs//g')
     [ "$named" = "$found" ] || { echo "test-web: found the tests $found, expected $named" >&2; exit 1; }

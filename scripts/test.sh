@@ -148,7 +148,8 @@ step "tests"
 cargo test --locked --workspace --no-fail-fast
 
 step "workflow"
-./scripts/test-workflow.sh
+# The program that the tests have built.
+MTE_SLAM=$target/debug/mte-slam ./scripts/test-workflow.sh
 
 step "features, and the build for a browser"
 built=0
