@@ -8,7 +8,8 @@ use wasm_bindgen_cli_support::Bindgen;
 fn main() -> Result<()> {
     let mut arguments = std::env::args().skip(1);
     let mut bindgen = Bindgen::new();
-    bindgen.web(true)?.typescript(true);
+    // As the command does: the initialization finds the module beside its script by itself.
+    bindgen.web(true)?.typescript(true).omit_default_module_path(false);
     let (mut module, mut folder) = (None, None);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().with_context(|| format!("{argument}: no value"));
