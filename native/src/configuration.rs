@@ -1,4 +1,4 @@
-//! The effective configuration: preset, then file, then `--set`, then the named flags.
+//! The configuration of a run: preset, then file, then `--set`, then the named flags.
 //!
 //! The core knows which settings there are and what they may be; here their values are read, and
 //! the source of a wrong one (a flag or a file) is named.
@@ -16,7 +16,7 @@ use toml::Table;
 
 /// The configuration of a run, and the preset it started from.
 #[derive(Clone, Debug)]
-pub struct Effective {
+pub struct Configured {
     /// Name of the preset.
     pub preset: String,
     /// All values.
@@ -25,7 +25,7 @@ pub struct Effective {
 
 /// Works out the configuration. `default_preset` is taken when neither the flag nor the file's
 /// `[run]` table names one.
-pub fn effective(args: &ConfigArgs, default_preset: &str) -> Result<Effective> {
+pub fn resolve(args: &ConfigArgs, default_preset: &str) -> Result<Configured> {
     let Some(path) = &args.config else { return with_file(args, default_preset, None) };
     let name = path.display().to_string();
     match std::fs::read_to_string(path) {
@@ -39,7 +39,7 @@ pub fn with_file(
     args: &ConfigArgs,
     default_preset: &str,
     file: Option<(&str, &str)>,
-) -> Result<Effective> {
+) -> Result<Configured> {
     let file = match file {
         Some((name, text)) => Some((name, parse_file(name, text)?)),
         None => None,
@@ -74,7 +74,7 @@ pub fn with_file(
         set("--seed", "seed", seed.into())?;
     }
     config.validate().map_err(|e| refused("configuration", &e))?;
-    Ok(Effective { preset, config })
+    Ok(Configured { preset, config })
 }
 
 /// `source` (a flag or a file) starts the message.
@@ -135,9 +135,9 @@ pub fn hash(config: &Config) -> Result<String> {
 mod tests {
     use super::*;
 
-    fn with(set: &[&str]) -> Result<Effective> {
+    fn with(set: &[&str]) -> Result<Configured> {
         let set = set.iter().map(|s| (*s).to_owned()).collect();
-        effective(&ConfigArgs { set, ..ConfigArgs::default() }, "replica")
+        resolve(&ConfigArgs { set, ..ConfigArgs::default() }, "replica")
     }
 
     fn message(set: &str) -> String {
@@ -160,7 +160,7 @@ mod tests {
     fn every_preset_can_be_chosen() {
         for name in Config::PRESETS {
             let preset = Some(name.to_owned());
-            let e = effective(&ConfigArgs { preset, ..ConfigArgs::default() }, "replica").unwrap();
+            let e = resolve(&ConfigArgs { preset, ..ConfigArgs::default() }, "replica").unwrap();
             assert_eq!(e.config, Config::preset(name).unwrap());
             let text = to_toml(&e.config).unwrap();
             let file = Some(("config.toml", text.as_str()));
@@ -204,11 +204,11 @@ mod tests {
         let text = to_toml(&config).unwrap() + "\n[run]\npreset = \"tum\"\nversion = \"x\"\n";
         std::fs::write(&path, text).unwrap();
         let args = ConfigArgs { config: Some(path.clone()), ..ConfigArgs::default() };
-        let back = effective(&args, "replica").unwrap();
+        let back = resolve(&args, "replica").unwrap();
         assert_eq!(back.preset, "tum");
         assert_eq!(hash(&back.config).unwrap(), hash(&config).unwrap());
         std::fs::write(&path, "[tracking]\nspeed = 3\n").unwrap();
-        let error = effective(&args, "replica").unwrap_err().to_string();
+        let error = resolve(&args, "replica").unwrap_err().to_string();
         assert!(error.contains("config.toml") && error.contains("tracking.speed"), "{error}");
     }
 }

@@ -2,7 +2,7 @@
 use crate::{
     args::{ConfigArgs, SelectionArgs},
     class_truth::ClassTruth,
-    configuration::{self, Effective},
+    configuration::{self, Configured},
     errors::usage,
     mesh_evaluation::MeshTruth,
     record::RunRecord,
@@ -25,7 +25,7 @@ pub struct Prepared {
     /// The recording.
     pub sequence: Box<dyn Sequence>,
     /// The configuration.
-    pub effective: Effective,
+    pub effective: Configured,
     /// Labels that classes are scored against.
     pub class_truth: ClassTruth,
     /// How it was opened.
@@ -41,14 +41,14 @@ pub fn prepare(
 ) -> Result<Prepared> {
     // Everything that can be wrong with the command line comes before anything slow.
     let named = config.preset.is_some();
-    let early = configuration::effective(config, "replica")?;
+    let early = configuration::resolve(config, "replica")?;
     let sequence = open(dataset, selection, screen)?;
     let info = sequence.info();
     let default_preset = preset_of_layout(info.layout);
     let effective = if named || default_preset == early.preset {
         early
     } else {
-        configuration::effective(config, default_preset)?
+        configuration::resolve(config, default_preset)?
     };
     let class_truth = if info.classes.is_empty() {
         ClassTruth::none("there are no labels", info)

@@ -2,7 +2,7 @@
 use crate::{
     args::{EngineArgs, OutputArgs},
     class_truth::ClassTruth,
-    configuration::{self, Effective},
+    configuration::{self, Configured},
     engine::{self, StartedEngine},
     evaluation::ViewScores,
     host::Terminal,
@@ -30,7 +30,7 @@ pub struct RunSetup<'a> {
     /// How it was opened (engine fields are filled in here).
     pub record: RunRecord,
     /// The configuration.
-    pub effective: Effective,
+    pub effective: Configured,
     /// Engine flags.
     pub engine: &'a EngineArgs,
     /// Output flags.

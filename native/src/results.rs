@@ -1,7 +1,7 @@
 //! What a run leaves in its output folder beside maps and views: trajectory, anchors, classes and
 //! the figures of metrics.json.
 use crate::{
-    configuration::{self, Effective},
+    configuration::{self, Configured},
     evaluation::{self, ViewScores},
     output::{
         classes,
@@ -151,7 +151,7 @@ pub fn sequence_record(info: &SequenceInfo, record: &RunRecord) -> SequenceRecor
 }
 
 /// How it was run, for metrics.json.
-pub fn configuration_record(effective: &Effective) -> Result<ConfigurationRecord> {
+pub fn configuration_record(effective: &Configured) -> Result<ConfigurationRecord> {
     Ok(ConfigurationRecord {
         preset: effective.preset.clone(),
         hash: configuration::hash(&effective.config)?,

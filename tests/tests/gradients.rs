@@ -315,7 +315,7 @@ fn per_sample_head_and_semantic_planes() {
     let mut config = config();
     config.semantics.head = Head::Sample;
     let mut problem = Problem::of(Engine::cpu(), losses(), config);
-    // A hundred times the work of a head that runs once a ray: fewer rays.
+    // A hundred times the work of a head that runs once per ray: fewer rays.
     problem.rays_per_frame = 16;
     let d = &problem.rig;
     assert!(d.fusion.is_none() && d.suppressor.is_none());

@@ -6,15 +6,21 @@ use crate::{
     message::*,
     pack, picture,
     platform::{clock_s, next_turn, wasm_bytes},
-    saved::PageFigures,
+    saved::{Kept, PageFigures},
     settings::Settings,
 };
+use js_sys::Uint8Array;
 use mte_slam_core::slam::{
     FrameReport, LiveMesh, MeshChunk, PoseEstimate, SlamError, TrackingStatus,
 };
 use mte_slam_metrics::{PosePair, ate};
 use mte_slam_run::{Run, Step};
 use mte_slam_types::{camera::Camera, pose::Pose};
+
+/// Shortest time between two states \[s\].
+const PAUSE_S: f64 = 5.0;
+/// At most one part in this many of the time goes into making states.
+const SHARE: f64 = 20.0;
 
 /// A recording under way.
 pub struct OpenRun {
@@ -45,6 +51,41 @@ impl OpenRun {
             self.save().await?;
         }
         Ok(more)
+    }
+
+    /// Whether it is time for another state.
+    fn save_is_due(&self) -> bool {
+        self.keep && clock_s() - self.saved_s >= self.save_pause_s
+    }
+
+    /// Emits the state of the run, unless there is nothing that opening again would not bring.
+    pub async fn save(&mut self) -> Result<(), Failure> {
+        let begun_s = clock_s();
+        let info = self.feed.info();
+        let frames = info.frames;
+        let kept = Kept {
+            name: info.name.clone(),
+            frames,
+            camera: info.camera,
+            settings: self.settings.clone(),
+            figures: self.figures.clone(),
+        };
+        let Some(checkpoint) = self.run.checkpoint(&kept, &self.page).await? else {
+            return Ok(());
+        };
+        let parts = checkpoint.parts();
+        let bytes = Uint8Array::new_with_length(parts.iter().map(|p| p.len() as u32).sum());
+        let mut at = 0;
+        for part in &parts {
+            let end = at + part.len() as u32;
+            bytes.subarray(at, end).copy_from(part);
+            at = end;
+        }
+        let frame = self.run.next_frame();
+        self.page.emit(&Event::Saved(SavedEvent { frame, frames, bytes: bytes.into() }));
+        self.saved_s = clock_s();
+        self.save_pause_s = PAUSE_S.max(SHARE * (self.saved_s - begun_s));
+        Ok(())
     }
 
     pub async fn step(&mut self) -> Result<bool, Failure> {

@@ -24,7 +24,7 @@ export const DATA = process.env.MTE_SLAM_DATA ?? [here("../../shared/data"), her
 /** Why tests with real recordings are skipped; false where they are not. */
 export const NO_DATA = !holdsData(DATA) && "there is no shared/data with room-11 and kitchen-7scenes, nor does MTE_SLAM_DATA name one";
 /** Small enough for a second a frame on one thread. */
-export const QUICK = "preset=tiny&engine=cpu&width=64&mesh=12&render=4&set.mapping.rays=300&set.mapping.first_iterations=50&set.mapping.iterations=4&set.mapping.final_iterations=4&set.sampling.render_stratified=24&set.sampling.render_surface=6&set.mesh.resolution_m=0.1&set.mesh.min_component_triangles=1";
+export const QUICK = "preset=tiny&engine=cpu&width=64&mesh=12&render=4&set.mapping.rays=300&set.mapping.first_iterations=50&set.mapping.iterations=4&set.mapping.final_iterations=4&set.mapping.semantic_iterations=24&set.sampling.render_stratified=24&set.sampling.render_surface=6&set.mesh.resolution_m=0.1&set.mesh.min_component_triangles=1";
 
 /** Set before the first test. */
 export const world = {};

@@ -135,7 +135,7 @@ test("the 3D view is lost and comes back with the mesh", { timeout: 120_000 }, a
 });
 
 test("WebGPU in software: the device is lost in the middle, and the run goes on by itself on a new one", { timeout: 540_000 }, async () => {
-  const page = await visit("source=room&preset=tiny&engine=gpu&frames=4&width=64&mesh=15&render=0&set.mapping.rays=256&set.mapping.first_iterations=60&set.mapping.iterations=2&set.mapping.final_iterations=2&set.tracking.align_pixels=256&set.tracking.render_rays=256&set.sampling.stratified=12");
+  const page = await visit("source=room&preset=tiny&engine=gpu&frames=4&width=64&mesh=15&render=0&set.mapping.rays=256&set.mapping.first_iterations=40&set.mapping.iterations=2&set.mapping.final_iterations=2&set.mapping.semantic_iterations=4&set.fusion.first_steps=4&set.tracking.align_pixels=256&set.tracking.render_rays=256&set.sampling.stratified=12");
   // A new worker has its own navigator: only the first device can be taken away.
   await Promise.all(page.workers().map((w) => w.evaluate(() => {
     const real = GPUAdapter.prototype.requestDevice;

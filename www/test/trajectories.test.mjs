@@ -9,7 +9,7 @@ import { BIN, SHOTS, download, finish, finished, setUp, visit, world } from "./p
 
 setUp();
 
-const SETTINGS = { "mapping.rays": 600, "mapping.iterations": 6, "mapping.first_iterations": 60, "mapping.final_iterations": 20, "mapping.every": 4, "tracking.align_pixels": 1024, "sampling.stratified": 16 };
+const SETTINGS = { "mapping.rays": 600, "mapping.iterations": 6, "mapping.first_iterations": 60, "mapping.final_iterations": 20, "mapping.semantic_iterations": 40, "mapping.every": 4, "tracking.align_pixels": 1024, "sampling.stratified": 16 };
 const FRAMES = 12;
 
 /** Rows of a TUM file: time, position, quaternion. */

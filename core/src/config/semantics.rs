@@ -31,7 +31,8 @@ mte_slam_types::choices! {
 mte_slam_types::settings! {
     /// Semantics.
     pub struct SemanticsConfig {
-        /// What turns semantic features into classes.
+        /// What turns semantic features into classes: `sample` is the paper's, for comparison, in
+        /// builds with the feature `sample-head` alone.
         head: Head = Head::Ray;
     }
 

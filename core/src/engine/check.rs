@@ -1,5 +1,5 @@
 //! Buffer tables and the checks that both engines make before they run commands.
-use super::EngineError;
+use super::error::EngineError;
 use crate::commands::{BufferId, Command, Commands, MAX_WORKGROUPS_PER_DIMENSION};
 use alloc::{format, string::String, vec::Vec};
 

@@ -1,7 +1,8 @@
 //! The engine that runs the kernels' Rust twins.
 use super::{
-    EngineError, EngineInfo, MAX_BUFFER_BYTES,
     check::{Table, allocated_words, buffer_size},
+    error::EngineError,
+    info::{EngineInfo, MAX_BUFFER_BYTES},
 };
 use crate::{
     commands::{BufferId, Command, Commands},

@@ -2,11 +2,12 @@
 mod adapter;
 mod encode;
 
-pub use adapter::{AdapterDescription, list_adapters};
+pub use adapter::{AdapterDescription, GpuOptions, list_adapters};
 
 use super::{
-    EngineError, EngineInfo, MAX_BUFFER_BYTES,
     check::{Table, allocated_words, buffer_size},
+    error::EngineError,
+    info::{EngineInfo, MAX_BUFFER_BYTES},
     oneshot,
 };
 use crate::{
@@ -17,17 +18,6 @@ use alloc::{collections::BTreeMap, format, string::String, sync::Arc, vec::Vec};
 use core::num::NonZeroU64;
 use mte_slam_shaders::{interface::Access, shader};
 use std::sync::Mutex;
-
-/// How to make a [`GpuEngine`].
-#[derive(Clone, Debug, Default)]
-pub struct GpuOptions {
-    /// Take the first adapter whose name contains this (case does not matter); ignored on the web.
-    pub adapter_name: Option<String>,
-    /// Take a software adapter.
-    pub force_fallback: bool,
-    /// Changed shader constants, see [`shader::compose`].
-    pub overrides: Vec<(&'static str, u32)>,
-}
 
 /// Bytes of parameter structs in one submission.
 const UNIFORM_BYTES: u64 = 64 << 10;
@@ -54,7 +44,6 @@ pub struct GpuEngine {
     device: wgpu::Device,
     queue: wgpu::Queue,
     info: EngineInfo,
-    overrides: Vec<(&'static str, u32)>,
     max_buffer_bytes: u64,
     buffers: Table<wgpu::Buffer>,
     /// By address of the kernel, which is static.
@@ -102,7 +91,6 @@ impl GpuEngine {
             device,
             queue,
             info: adapter::engine_info(&info),
-            overrides: options.overrides,
             max_buffer_bytes,
             buffers: Table::new(),
             kernels: BTreeMap::new(),
@@ -288,7 +276,7 @@ impl GpuEngine {
         if self.kernels.contains_key(&address(kernel)) {
             return Ok(());
         }
-        let source = shader::compose(kernel.interface, &self.overrides)?;
+        let source = shader::compose(kernel.interface, &[])?;
         let device = &self.device;
         let label = Some(kernel.interface.name);
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {

@@ -1,4 +1,4 @@
-//! Gradients of the decoders that run once a ray.
+//! Gradients of the decoders that run once per ray.
 pub use mte_slam_shaders::kernels::weight_gradient::WeightGradientParams;
 
 use crate::kernel::{CpuDispatch, store_f32};

@@ -6,6 +6,7 @@ use alloc::string::String;
 
 /// What a run could not do.
 #[derive(Clone, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SlamError {
     /// The engine failed.
     #[error(transparent)]

@@ -20,16 +20,19 @@ mod pyramid;
 mod registration;
 mod registration_search;
 mod residuals;
+mod result;
 mod saved;
+mod search;
 mod thumbnail;
 
 pub use align::{Alignment, Reference, align, align_many};
 pub use config::{AlignConfig, OdometryConfig, PyramidConfig};
 pub use keyframe::OdometryKeyframe;
-pub use odometer::{LostReason, Odometer, OdometryResult, Quality};
+pub use odometer::Odometer;
 pub use pose_graph::{Edge, PoseGraph};
 pub use pyramid::RgbdPyramid;
 pub use registration::ColorRegistration;
+pub use result::{LostReason, OdometryResult, Quality};
 pub use saved::{OdometerState, Rebuild, since};
 
 #[cfg(test)]

@@ -1,15 +1,13 @@
 //! Which recording is read, and how; and the commands that are about recordings alone.
 use super::values::at_least_one;
 use clap::{Args, ValueEnum, ValueHint};
-use mte_slam_dataset::GivenCamera;
+use mte_slam_dataset::{GivenCamera, Layout};
 use std::path::PathBuf;
 
 /// Which part of a recording, and how it is read.
 #[derive(Clone, Debug, Args)]
 pub struct SelectionArgs {
-    /// Layout of the files, instead of recognising it: replica, replica-vmap, tum, 7scenes,
-    /// scannet, sens, nerfstudio, images.
-    #[arg(long, value_name = "LAYOUT", help_heading = "Recording")]
+    #[arg(long, value_name = "LAYOUT", help_heading = "Recording", help = layout_help())]
     pub layout: Option<String>,
     /// Take at most N frames [default: all].
     #[arg(long, value_name = "N", value_parser = at_least_one, help_heading = "Recording")]
@@ -125,6 +123,10 @@ pub struct ConvertArgs {
     /// Which part of the recording, and how it is read.
     #[command(flatten)]
     pub selection: SelectionArgs,
+}
+
+fn layout_help() -> String {
+    format!("Layout of the files, instead of recognizing it: {}", Layout::names())
 }
 
 /// A layout that can be written.

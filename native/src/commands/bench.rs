@@ -55,8 +55,8 @@ struct Stage {
 #[derive(Serialize)]
 struct Measured {
     rays: u32,
-    samples_a_ray: u32,
-    ms_an_iteration: f64,
+    samples_per_ray: u32,
+    ms_per_iteration: f64,
     stages: Vec<Stage>,
 }
 
@@ -89,9 +89,9 @@ struct ClassTime {
 #[derive(Serialize)]
 struct SemanticPath {
     rays: u32,
-    samples_a_ray: u32,
+    samples_per_ray: u32,
     rounds: usize,
-    once_a_ray: ClassTime,
+    once_per_ray: ClassTime,
     every_sample: ClassTime,
     ratio_to_class: f64,
     ratio_training: f64,
@@ -176,7 +176,7 @@ pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
     );
     let _ = writeln!(
         text,
-        "\ntracking (align), {points} points: {align_ms:.2} ms an iteration, with reading back"
+        "\ntracking (align), {points} points: {align_ms:.2} ms per iteration, with reading back"
     );
     if let Some(semantic) = &semantic {
         describe_semantic_path(&mut text, semantic);
@@ -191,16 +191,16 @@ pub fn run(args: &BenchArgs, screen: Screen) -> Result<()> {
         "mapping": mapping,
         "modules": modules,
         "semantic_path": semantic,
-        "tracking_align": { "points": points, "ms_an_iteration": align_ms },
+        "tracking_align": { "points": points, "ms_per_iteration": align_ms },
     });
     screen.result(&text, &format!("{json:#}\n"));
     Ok(())
 }
 
 fn describe(text: &mut String, name: &str, m: &Measured) {
-    let (rays, samples) = (m.rays, m.samples_a_ray);
+    let (rays, samples) = (m.rays, m.samples_per_ray);
     let size = if rays > 0 { format!(", {rays} x {samples}") } else { String::new() };
-    let _ = writeln!(text, "\n{name}{size}: {:.2} ms an iteration", m.ms_an_iteration);
+    let _ = writeln!(text, "\n{name}{size}: {:.2} ms per iteration", m.ms_per_iteration);
     let sum: f64 = m.stages.iter().map(|s| s.ms).sum();
     for s in &m.stages {
         let _ = writeln!(text, "  {:22}{:9.2} ms {:5.1} %", s.kernel, s.ms, 100.0 * s.ms / sum);
@@ -213,14 +213,14 @@ fn describe_semantic_path(text: &mut String, semantic: &SemanticPath) {
         "\nsemantic path, {} x {}, {CLASSES} classes: what classes add, median of {} rounds\n  \
          {:22}{:>12}{:>22}",
         semantic.rays,
-        semantic.samples_a_ray,
+        semantic.samples_per_ray,
         semantic.rounds,
         "head",
         "to class",
         "with gradients, Adam"
     );
     for (name, t) in
-        [("once a ray", semantic.once_a_ray), ("on every sample", semantic.every_sample)]
+        [("once per ray", semantic.once_per_ray), ("on every sample", semantic.every_sample)]
     {
         let _ = writeln!(text, "  {name:22}{:9.2} ms{:19.2} ms", t.to_class_ms, t.training_ms);
     }
@@ -367,7 +367,7 @@ fn measure(
     let mut r = Commands::default();
     bench.scratch.upload_window(&mut r, &window);
     // Warm up: pipelines are compiled on first use.
-    let (rays, samples_a_ray) = record(bench, config, kind, 0, &mut r);
+    let (rays, samples_per_ray) = record(bench, config, kind, 0, &mut r);
     bench.engine.submit(&r)?;
     block_on(bench.engine.synchronise())?;
 
@@ -381,7 +381,7 @@ fn measure(
         }
     }
     block_on(bench.engine.synchronise())?;
-    let ms_an_iteration = ms_since(begin) / iterations as f64;
+    let ms_per_iteration = ms_since(begin) / iterations as f64;
     progress.set(iterations as u64, String::new);
 
     let mut stages: Vec<Stage> = Vec::new();
@@ -409,7 +409,7 @@ fn measure(
         progress.set((iterations + i) as u64 + 1, String::new);
     }
     progress.finish();
-    Ok(Measured { rays, samples_a_ray, ms_an_iteration, stages })
+    Ok(Measured { rays, samples_per_ray, ms_per_iteration, stages })
 }
 
 /// The modules' parts, after a measured mapping iteration on the same device.
@@ -423,12 +423,12 @@ fn measure_modules(
     let suppressor = measure(bench, config, Kind::Suppressor, iterations, screen)?;
     let fusion = measure(bench, config, Kind::Fusion, iterations, screen)?;
     let (mapping_iterations, steps) = (config.mapping.iterations, config.fusion.steps);
-    let call_ms = mapping.ms_an_iteration * f64::from(mapping_iterations);
+    let call_ms = mapping.ms_per_iteration * f64::from(mapping_iterations);
     let stage = |m: &Measured, name: &str| -> f64 {
         m.stages.iter().filter(|s| s.kernel == name).map(|s| s.ms).sum()
     };
     let dispatches = |m: &Measured| -> usize { m.stages.iter().map(|s| s.dispatches).sum() };
-    let added = fusion.ms_an_iteration * f64::from(steps)
+    let added = fusion.ms_per_iteration * f64::from(steps)
         + stage(&suppressor, "update_anchors") * f64::from(mapping_iterations)
         + stage(&suppressor, "maintain_anchors");
     Ok(Modules {
@@ -445,7 +445,7 @@ fn measure_modules(
     })
 }
 
-/// Three maps: without classes, with a head once a ray, with one on every sample.
+/// Three maps: without classes, with a head once per ray, with one on every sample.
 fn measure_semantic_path(
     config: &Config,
     engine: &EngineArgs,
@@ -456,7 +456,7 @@ fn measure_semantic_path(
     let rounds = iterations.min(5);
     let mut progress = screen.progress("semantic path", rounds);
     let mut benches = Vec::new();
-    let (mut rays, mut samples_a_ray) = (0, 0);
+    let (mut rays, mut samples_per_ray) = (0, 0);
     for (classes, head) in [(0, Head::Ray), (CLASSES, Head::Ray), (CLASSES, Head::Sample)] {
         let mut config = config.clone();
         config.semantics.head = head;
@@ -465,7 +465,7 @@ fn measure_semantic_path(
         let mut r = Commands::default();
         let window: Vec<_> = (FIRST_SLOT..FIRST_SLOT + WINDOW).map(|slot| (slot, true)).collect();
         bench.scratch.upload_window(&mut r, &window);
-        (rays, samples_a_ray) = record(&mut bench, &config, Kind::Mapping, 0, &mut r);
+        (rays, samples_per_ray) = record(&mut bench, &config, Kind::Mapping, 0, &mut r);
         bench.engine.submit(&r)?;
         block_on(bench.engine.synchronise())?;
         benches.push((bench, config));
@@ -509,15 +509,15 @@ fn measure_semantic_path(
         to_class_ms: (median[class[1]] - median[class[0]]).max(0.0),
         training_ms: (median[training[1]] - median[training[0]]).max(0.0),
     };
-    let (once_a_ray, every_sample) = (time([0, 1], [3, 4]), time([0, 2], [5, 6]));
+    let (once_per_ray, every_sample) = (time([0, 1], [3, 4]), time([0, 2], [5, 6]));
     Ok(SemanticPath {
         rays,
-        samples_a_ray,
+        samples_per_ray,
         rounds,
-        once_a_ray,
+        once_per_ray,
         every_sample,
-        ratio_to_class: once_a_ray.to_class_ms / every_sample.to_class_ms,
-        ratio_training: once_a_ray.training_ms / every_sample.training_ms,
+        ratio_to_class: once_per_ray.to_class_ms / every_sample.to_class_ms,
+        ratio_training: once_per_ray.training_ms / every_sample.training_ms,
     })
 }
 

@@ -13,7 +13,7 @@ use std::path::Path;
 
 /// Runs SLAM on the built-in sequence.
 pub fn run(args: &DemoArgs, screen: Screen) -> Result<()> {
-    let effective = configuration::effective(&args.config, "fast")?;
+    let effective = configuration::resolve(&args.config, "fast")?;
     let sequence = input::built_in(args.frames, args.width);
     let record = RunRecord {
         version: env!("CARGO_PKG_VERSION").to_owned(),

@@ -21,7 +21,7 @@ impl Program for RunCommand {
 
     fn run_of(&self, dataset: &Path, options: &Table, preset: &str, place: &str) -> Result<RunOf> {
         let args = options::run_args(dataset, options, place)?;
-        let config = match configuration::effective(&args.config, preset) {
+        let config = match configuration::resolve(&args.config, preset) {
             Ok(effective) => effective.config,
             Err(error) => usage!("{place}: {error:#}"),
         };

@@ -1,4 +1,4 @@
-//! Gradients of the decoders that run once a ray.
+//! Gradients of the decoders that run once per ray.
 
 shared_struct! {
     /// Parameters of `weight_gradient`.

@@ -1,6 +1,15 @@
 //! Finding and describing adapters.
-use super::{EngineError, EngineInfo, GpuOptions};
+use super::super::{error::EngineError, info::EngineInfo};
 use alloc::{format, string::String, vec::Vec};
+
+/// Which adapter a [`GpuEngine`](super::GpuEngine) takes.
+#[derive(Clone, Debug, Default)]
+pub struct GpuOptions {
+    /// Take the first adapter whose name contains this (case does not matter); ignored on the web.
+    pub adapter_name: Option<String>,
+    /// Take a software adapter.
+    pub force_fallback: bool,
+}
 
 /// A graphics adapter of this machine.
 #[derive(Clone, Debug, PartialEq, Eq)]

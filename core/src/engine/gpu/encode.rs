@@ -1,5 +1,5 @@
 //! Turning checked commands into submissions.
-use super::{EngineError, GpuEngine, UNIFORM_BYTES, address};
+use super::{super::error::EngineError, GpuEngine, UNIFORM_BYTES, address};
 use crate::commands::{Command, Commands};
 use alloc::vec::Vec;
 use wgpu::util::DeviceExt as _;

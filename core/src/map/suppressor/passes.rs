@@ -1,5 +1,5 @@
 //! The passes of the suppressor over a batch of rays.
-use super::AnchorCounts;
+use super::{AnchorCounts, Suppressor};
 use crate::{
     call::Call,
     commands::Commands,
@@ -48,13 +48,8 @@ pub fn record_update(r: &mut Commands, map: &Map, scratch: &Scratch, b: &Batch<'
     );
 }
 
-/// Drops, merges and spawns anchors from the features of the last forward pass.
-///
-/// Records nothing without a suppressor.
-pub fn record_maintenance(r: &mut Commands, map: &Map, scratch: &Scratch, b: &Batch<'_>) {
-    let Some(s) = &map.suppressor else { return };
-    let c = &s.config;
-    let square = |d: f64| (d * d) as f32;
+/// The buffers of a maintenance.
+fn maintenance(s: &Suppressor, scratch: &Scratch) -> maintain_anchors::Buffers {
     maintain_anchors::Buffers {
         rays: scratch.rays,
         ray_state: scratch.ray_state,
@@ -63,7 +58,16 @@ pub fn record_maintenance(r: &mut Commands, map: &Map, scratch: &Scratch, b: &Ba
         anchor_counts: s.counts,
         class_support: s.support,
     }
-    .record_workgroups(
+}
+
+/// Drops, merges and spawns anchors from the features of the last forward pass.
+///
+/// Records nothing without a suppressor.
+pub fn record_maintenance(r: &mut Commands, map: &Map, scratch: &Scratch, b: &Batch<'_>) {
+    let Some(s) = &map.suppressor else { return };
+    let c = &s.config;
+    let square = |d: f64| (d * d) as f32;
+    maintenance(s, scratch).record_workgroups(
         r,
         &MaintainAnchorsParams {
             rays: b.rays(),
@@ -135,15 +139,7 @@ pub fn record_settling(
         rays as usize,
     );
     settle(r, rays);
-    maintain_anchors::Buffers {
-        rays: scratch.rays,
-        ray_state: scratch.ray_state,
-        anchors: s.anchors,
-        votes: s.votes,
-        anchor_counts: s.counts,
-        class_support: s.support,
-    }
-    .record_workgroups(
+    maintenance(s, scratch).record_workgroups(
         r,
         &MaintainAnchorsParams {
             rays,
