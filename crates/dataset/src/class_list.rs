@@ -1,7 +1,7 @@
 //! Which classes there are: from a file, or one of the lists that the field's data sets use.
 use super::folder::{invalid, shortened};
 use mte_slam_types::{
-    classes::{Class, ClassTable},
+    classes::{Class, ClassTable, class_color},
     sequence::SequenceError,
 };
 use std::collections::BTreeMap;
@@ -123,18 +123,6 @@ impl ClassList {
     }
 }
 
-/// Returns a colour for a class without one: hues a golden ratio apart, in three brightnesses.
-pub fn class_color(id: u16) -> [u8; 3] {
-    let hue = f64::from(id) * 0.618_033_988_749_895 % 1.0 * 6.0;
-    let value = [240.0, 200.0, 160.0][usize::from(id % 3)];
-    let channel = |shift: f64| {
-        let k = (shift + hue) % 6.0;
-        let fall = k.min(4.0 - k).clamp(0.0, 1.0);
-        (value * (1.0 - 0.7 * fall)) as u8
-    };
-    [channel(5.0), channel(3.0), channel(1.0)]
-}
-
 /// Names and colours of the ids 1 to 40.
 #[rustfmt::skip]
 const NYU40: [(&str, [u8; 3]); 40] = [
@@ -231,11 +219,5 @@ mod tests {
         }
         assert_eq!(ClassList::nyu40().table.classes[35].color, [227, 119, 194]);
         assert_eq!(ClassList::built_in("coco"), None);
-    }
-
-    #[test]
-    fn colours_differ() {
-        let colors: BTreeSet<[u8; 3]> = (0..255).map(class_color).collect();
-        assert!(colors.len() > 250, "{}", colors.len());
     }
 }

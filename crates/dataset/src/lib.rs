@@ -45,7 +45,7 @@ pub mod stream;
 mod write;
 mod zip;
 
-pub use class_list::{ClassList, class_color};
+pub use class_list::ClassList;
 pub use decode::{MAX_PIXELS, MAX_SIDE};
 pub use layouts::Layout;
 pub use memory::MemorySource;

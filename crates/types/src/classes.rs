@@ -40,3 +40,27 @@ impl ClassTable {
         self.classes.iter().enumerate().map(|(i, c)| (c.raw_id, i as u8)).collect()
     }
 }
+
+/// Returns a colour for a class without one: hues a golden ratio apart, in three brightnesses.
+pub fn class_color(id: u16) -> [u8; 3] {
+    let hue = f64::from(id) * 0.618_033_988_749_895 % 1.0 * 6.0;
+    let value = [240.0, 200.0, 160.0][usize::from(id % 3)];
+    let channel = |shift: f64| {
+        let k = (shift + hue) % 6.0;
+        let fall = k.min(4.0 - k).clamp(0.0, 1.0);
+        (value * (1.0 - 0.7 * fall)) as u8
+    };
+    [channel(5.0), channel(3.0), channel(1.0)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use alloc::collections::BTreeSet;
+
+    #[test]
+    fn colors_differ() {
+        let colors: BTreeSet<[u8; 3]> = (0..255).map(class_color).collect();
+        assert!(colors.len() > 250, "{}", colors.len());
+    }
+}

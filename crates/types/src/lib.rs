@@ -10,6 +10,7 @@ extern crate alloc;
 pub mod camera;
 pub mod classes;
 pub mod frame;
+pub mod groups;
 pub mod hash;
 pub mod maths;
 pub mod parallel;
