@@ -3,6 +3,7 @@
 mod engine;
 mod evaluation;
 mod recording;
+mod segmentation;
 mod suite;
 mod values;
 
@@ -12,6 +13,7 @@ pub use evaluation::{CullChoice, EvalArgs, InferenceChoice, MiouProtocol};
 pub use recording::{
     ClassArgs, ColorChoice, ConvertArgs, InspectArgs, SelectionArgs, SensorArgs, TargetLayout,
 };
+pub use segmentation::{LabelArgs, SegmenterArgs, turn, turn_name};
 pub use suite::EvaluateArgs;
 
 use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
@@ -139,6 +141,21 @@ pub enum Command {
         mte-slam inspect data/mine --camera \"525 525 319.5 239.5\" --depth-scale 5000"
     )]
     Inspect(InspectArgs),
+    /// Label a recording by a segmentation network
+    #[command(
+        long_about = "Label a recording by a segmentation network of your choice (an ONNX file), and write \
+        what `run --labels DIR` and other tools read: label images with the ids of the network's classes, \
+        their names in classes.json, and how certain the network is.\n\n\
+        The output folder receives:\n    \
+        semantic_class/semantic_class_000000.png   ids of the classes, 16 bits; 65535 where there is none\n    \
+        confidence/000000.png                      probability of the class, in 1/255\n    \
+        classes.json                               ids, names and colours\n\n\
+        Examples:\n    \
+        mte-slam label data/mine --segmenter models/segformer-b0 --out data/mine-labels\n    \
+        mte-slam run data/mine --labels data/mine-labels\n    \
+        mte-slam run data/mine --segmenter models/segformer-b0     (both at once)"
+    )]
+    Label(LabelArgs),
     /// Write a recording in another layout
     #[command(
         long_about = "Write a recording, as it is read (part, scale, camera, undistorted), in another \
@@ -314,6 +331,9 @@ pub struct DemoArgs {
     /// Image width in pixels; the height is three quarters of it.
     #[arg(long, value_name = "PIXELS", default_value = "160", value_parser = picture_width, help_heading = "Recording")]
     pub width: u32,
+    /// Labels of a network, in place of the true ones, which its classes are scored against.
+    #[command(flatten)]
+    pub segmentation: SegmenterArgs,
     /// Configuration.
     #[command(flatten)]
     pub config: ConfigArgs,

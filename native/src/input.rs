@@ -5,8 +5,9 @@ use crate::{
     configuration::{self, Configured},
     errors::usage,
     mesh_evaluation::MeshTruth,
-    record::RunRecord,
+    record::{RunRecord, SegmenterRecord},
     screen::Screen,
+    segmentation,
     source::{self, has_ending},
 };
 use anyhow::{Error, Result};
@@ -42,14 +43,18 @@ pub fn prepare(
     // Everything that can be wrong with the command line comes before anything slow.
     let named = config.preset.is_some();
     let early = configuration::resolve(config, "replica")?;
-    let sequence = open(dataset, selection, screen)?;
-    let info = sequence.info();
-    let default_preset = preset_of_layout(info.layout);
+    let sequence = open_recording(dataset, selection, screen)?;
+    let default_preset = preset_of_layout(sequence.info().layout);
     let effective = if named || default_preset == early.preset {
         early
     } else {
         configuration::resolve(config, default_preset)?
     };
+    // Labels of other frames than those that are mapped would do nothing.
+    let every = effective.config.mapping.every as usize;
+    let sequence = segmentation::labelled(sequence, &selection.segmentation, every, screen)?;
+    let info = sequence.info();
+    note_features(selection, info, screen);
     let class_truth = if info.classes.is_empty() {
         ClassTruth::none("there are no labels", info)
     } else {
@@ -72,6 +77,8 @@ pub fn prepare(
         features: selection.features.as_ref().map(|f| f.display().to_string()),
         classes: selection.classes.classes.clone(),
         unlabelled: selection.classes.unlabelled,
+        segmenter: SegmenterRecord::of(&selection.segmentation),
+        groups: selection.segmentation.groups.clone(),
         ..RunRecord::default()
     };
     Ok(Prepared { sequence, effective, class_truth, record })
@@ -95,8 +102,31 @@ pub fn folder_name(path: &Path) -> String {
     name.map_or("recording".to_owned(), |n| n.to_string_lossy().into_owned())
 }
 
-/// Opens a recording.
+/// Opens a recording, with the labels that the flags ask for in every frame.
 pub fn open(path: &Path, selection: &SelectionArgs, screen: Screen) -> Result<Box<dyn Sequence>> {
+    let sequence = open_recording(path, selection, screen)?;
+    let sequence = segmentation::labelled(sequence, &selection.segmentation, 1, screen)?;
+    note_features(selection, sequence.info(), screen);
+    Ok(sequence)
+}
+
+fn note_features(selection: &SelectionArgs, info: &SequenceInfo, screen: Screen) {
+    if let Some(folder) = selection.features.as_deref().filter(|_| info.classes.is_empty()) {
+        let name = folder.display();
+        screen.note(&format!("note: {name}: feature maps do nothing without labels to learn from"));
+    }
+}
+
+/// Opens a recording as its files are.
+pub fn open_recording(
+    path: &Path,
+    selection: &SelectionArgs,
+    screen: Screen,
+) -> Result<Box<dyn Sequence>> {
+    let segmented = selection.segmentation.segmenter.is_some();
+    if segmented && selection.labels != "dataset" {
+        usage!("--labels {}: expected either it or --segmenter", selection.labels);
+    }
     let layout = selection.layout.as_deref().map(layout_named).transpose()?;
     let (source, skipped_links) = source::open(path)?;
     if let [first, ..] = skipped_links.as_slice() {
@@ -106,12 +136,8 @@ pub fn open(path: &Path, selection: &SelectionArgs, screen: Screen) -> Result<Bo
         ));
     }
     let features = selection.features.as_deref();
-    let sequence = open_source(path, source, layout, &selection.labels, features, selection)?;
-    if let Some(folder) = features.filter(|_| sequence.info().classes.is_empty()) {
-        let name = folder.display();
-        screen.note(&format!("note: {name}: feature maps do nothing without labels to learn from"));
-    }
-    Ok(sequence)
+    let labels = if segmented { "none" } else { &selection.labels };
+    open_source(path, source, layout, labels, features, selection)
 }
 
 fn open_source(
@@ -199,7 +225,8 @@ pub fn open_truth(
         Some(wanted) => wanted,
         None => "dataset",
     };
-    if wanted == selection.labels {
+    let segmented = selection.segmentation.segmenter.is_some();
+    if wanted == selection.labels && !segmented {
         if chosen.is_some() && input.classes.is_empty() {
             usage!("--truth-labels {wanted}: found no label images in the recording");
         }
@@ -207,9 +234,13 @@ pub fn open_truth(
     }
     let layout = selection.layout.as_deref().map(layout_named).transpose()?;
     let truth = open_source(path, source::open(path)?.0, layout, wanted, None, selection)?;
+    let truth = segmentation::grouped(truth, &selection.segmentation)?;
     if truth.info().classes.is_empty() {
         if chosen.is_some() {
             usage!("--truth-labels {wanted}: found no label images in the recording");
+        }
+        if segmented {
+            return Ok(ClassTruth::none("the recording has no labels of its own", input));
         }
         return Ok(ClassTruth::of_input(&selection.labels, input));
     }

@@ -21,6 +21,7 @@ mod restore;
 mod results;
 mod resume;
 mod screen;
+mod segmentation;
 mod server;
 mod source;
 mod steps;
@@ -55,6 +56,7 @@ fn follow(cli: &Cli) -> anyhow::Result<()> {
         Command::Synth(args) => commands::synth::run(args, screen),
         Command::Inspect(args) => commands::inspect::run(args, screen),
         Command::Convert(args) => commands::convert::run(args, screen),
+        Command::Label(args) => commands::label::run(args, screen),
         Command::Serve(args) => commands::serve::run(args, screen),
         Command::Evaluate(args) => commands::evaluate::run(args, screen),
         Command::Info(args) => commands::info::run(args, screen),

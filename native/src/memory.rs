@@ -1,4 +1,4 @@
-//! Peak memory of this process.
+//! Memory of this process, and of the machine.
 
 /// Peak resident memory \[bytes\], or why it is not known.
 pub fn peak_host_bytes() -> Result<u64, String> {
@@ -10,6 +10,14 @@ pub fn peak_host_bytes() -> Result<u64, String> {
     }
     #[cfg(not(target_os = "linux"))]
     Err(format!("not measured on {}", std::env::consts::OS))
+}
+
+/// Memory that is free for this process \[bytes\], where it is known.
+pub fn available_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
+    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kib << 10)
 }
 
 #[cfg(any(target_os = "linux", test))]

@@ -1,7 +1,11 @@
 //! Views from poses that a map never saw: where they are found.
 use crate::{
-    args::SelectionArgs, class_truth::ClassTruth, input, output::metrics::Metrics,
-    record::RunRecord, screen::Screen,
+    args::{SegmenterArgs, SelectionArgs},
+    class_truth::ClassTruth,
+    input,
+    output::metrics::Metrics,
+    record::RunRecord,
+    screen::Screen,
 };
 use anyhow::Result;
 use mte_slam_core::slam::Slam;
@@ -46,6 +50,10 @@ pub fn recorded(
         labels: "dataset".to_owned(),
         truth_labels: None,
         features: None,
+        segmentation: SegmenterArgs {
+            groups: selection.segmentation.groups.clone(),
+            ..SegmenterArgs::default()
+        },
         ..selection.clone()
     };
     let mut views = input::open(recording, &selection, screen)?;

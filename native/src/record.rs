@@ -1,12 +1,13 @@
 //! `config.toml`: the configuration with, in `[run]`, where it was used and on what.
 use crate::{
-    args::{ClassArgs, SelectionArgs, SensorArgs},
+    args::{ClassArgs, SegmenterArgs, SelectionArgs, SensorArgs, turn, turn_name},
     configuration,
     output::metrics::EngineRecord,
 };
 use anyhow::{Context, Result};
 use mte_slam_core::config::Config;
 use mte_slam_dataset::GivenCamera;
+use mte_slam_segment::InputSize;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -54,6 +55,12 @@ pub struct RunRecord {
     /// The id asked to mean "no label", if any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unlabelled: Option<u16>,
+    /// The network that made the labels, if any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub segmenter: Option<SegmenterRecord>,
+    /// Groups into which classes were merged, if any: `indoor` or a file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub groups: Option<String>,
     /// Focal length of the colour camera over that of the depth camera, as the map was trained.
     #[serde(rename = "colour_scale")]
     pub color_scale: f64,
@@ -65,6 +72,50 @@ pub struct RunRecord {
     pub backend: String,
     /// Driver.
     pub driver: String,
+}
+
+/// A segmentation network, and how it was used.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SegmenterRecord {
+    /// The model as given.
+    pub model: String,
+    /// Width and height of its input, if given \[pixels\].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size: Option<[usize; 2]>,
+    /// Step between the labelled frames, if given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub every: Option<usize>,
+    /// Least confidence of a label.
+    pub min_confidence: String,
+    /// What brings the images upright.
+    pub turn: String,
+}
+
+impl SegmenterRecord {
+    /// What the flags say, if they name a network.
+    pub fn of(args: &SegmenterArgs) -> Option<SegmenterRecord> {
+        Some(SegmenterRecord {
+            model: args.segmenter.clone()?,
+            size: args.segment_size.map(|s| [s.width, s.height]),
+            every: args.segment_every,
+            min_confidence: args.min_confidence.to_string(),
+            turn: turn_name(args.turn).to_owned(),
+        })
+    }
+
+    /// The flags that say so.
+    fn selection(record: Option<&SegmenterRecord>, groups: Option<String>) -> SegmenterArgs {
+        let Some(r) = record else { return SegmenterArgs { groups, ..SegmenterArgs::default() } };
+        SegmenterArgs {
+            segmenter: Some(r.model.clone()),
+            segment_size: r.size.map(|[width, height]| InputSize { width, height }),
+            segment_every: r.every,
+            min_confidence: r.min_confidence.parse().unwrap_or(0.0),
+            turn: turn(&r.turn).unwrap_or_default(),
+            segment_threads: None,
+            groups,
+        }
+    }
 }
 
 impl Default for RunRecord {
@@ -87,6 +138,8 @@ impl Default for RunRecord {
             features: None,
             classes: None,
             unlabelled: None,
+            segmenter: None,
+            groups: None,
             color_scale: 1.0,
             engine: String::new(),
             adapter: String::new(),
@@ -114,6 +167,15 @@ impl RunRecord {
             truth_labels: None,
             features: None,
             classes: ClassArgs { classes: self.classes.clone(), unlabelled: self.unlabelled },
+            segmentation: SegmenterRecord::selection(self.segmenter.as_ref(), self.groups.clone()),
+        }
+    }
+
+    /// What the map learnt its classes from, for people and figures.
+    pub fn labels_name(&self) -> String {
+        match &self.segmenter {
+            Some(segmenter) => format!("segmenter {}", segmenter.model),
+            None => self.labels.clone(),
         }
     }
 

@@ -144,7 +144,7 @@ pub fn sequence_record(info: &SequenceInfo, record: &RunRecord) -> SequenceRecor
         start: record.start,
         stride: record.stride,
         scale: record.scale,
-        labels: record.labels.clone(),
+        labels: record.labels_name(),
         truth_labels: record.truth_labels.clone(),
         classes: info.classes.len(),
     }

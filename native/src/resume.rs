@@ -102,6 +102,14 @@ fn difference(
             ("axes", format!("{:?}", r.axes)),
             ("feature maps", r.features.is_some().to_string()),
             ("unlabelled", format!("{:?}", r.unlabelled)),
+            (
+                "segmenter",
+                format!(
+                    "{:?}",
+                    r.segmenter.as_ref().map(|s| (s.size, s.every, &s.min_confidence, &s.turn))
+                ),
+            ),
+            ("groups", format!("{:?}", r.groups)),
             ("preset", r.preset.clone()),
             ("configuration", if config { r.config_hash.clone() } else { String::new() }),
         ]

@@ -3,7 +3,7 @@ use crate::{
     frame::{Frame, SequenceInfo},
     pose::Pose,
 };
-use alloc::{format, string::String, vec::Vec};
+use alloc::{boxed::Box, format, string::String, vec::Vec};
 
 /// Why a recording could not be read. Every variant names the file (or the folder) it is about.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -87,6 +87,40 @@ pub trait Source {
 pub fn too_short(file: &str, size: u64, offset: u64, bytes: usize) -> SequenceError {
     let reason = format!("{size} bytes long, {bytes} bytes from {offset} on were expected");
     SequenceError::Read { file: file.into(), reason }
+}
+
+impl<S: Sequence + ?Sized> Sequence for Box<S> {
+    fn info(&self) -> &SequenceInfo {
+        (**self).info()
+    }
+
+    fn frame(&mut self, index: usize) -> Result<Frame, SequenceError> {
+        (**self).frame(index)
+    }
+
+    fn labels(&mut self, index: usize) -> Result<Option<Vec<u8>>, SequenceError> {
+        (**self).labels(index)
+    }
+
+    fn truth(&self, index: usize) -> Option<Pose> {
+        (**self).truth(index)
+    }
+
+    fn view_from(&mut self, index: usize, world_from_camera: &Pose) -> Option<Frame> {
+        (**self).view_from(index, world_from_camera)
+    }
+
+    fn time_s(&self, index: usize) -> f64 {
+        (**self).time_s(index)
+    }
+
+    fn number(&self, index: usize) -> u64 {
+        (**self).number(index)
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        (**self).warnings()
+    }
 }
 
 /// An RGB-D sequence.

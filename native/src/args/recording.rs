@@ -1,5 +1,5 @@
 //! Which recording is read, and how; and the commands that are about recordings alone.
-use super::values::at_least_one;
+use super::{SegmenterArgs, values::at_least_one};
 use clap::{Args, ValueEnum, ValueHint};
 use mte_slam_dataset::{GivenCamera, Layout};
 use std::path::PathBuf;
@@ -45,6 +45,9 @@ pub struct SelectionArgs {
     /// What the labels and the truth are read with.
     #[command(flatten)]
     pub classes: ClassArgs,
+    /// Labels of a network.
+    #[command(flatten)]
+    pub segmentation: SegmenterArgs,
 }
 
 /// What the files say, or should say, about the sensor.

@@ -114,7 +114,7 @@ pub fn run(args: &AblateArgs, screen: Screen) -> Result<()> {
         stride: record.stride,
         frames: record.frames,
         scale: record.scale,
-        labels: record.labels.clone(),
+        labels: record.labels_name(),
         truth_labels: record.truth_labels.clone(),
         features: record.features.clone(),
         classes: record.classes.clone(),
@@ -231,7 +231,7 @@ fn check_labels(
 ) -> Result<()> {
     let info = sequence.info().clone();
     let name = args.dataset.display();
-    let labels = &args.selection.labels;
+    let labels = args.selection.segmentation.segmenter.as_ref().unwrap_or(&args.selection.labels);
     if info.classes.is_empty() {
         usage!(
             "{name}: ablate needs labels: found none (--labels {labels}), expected a recording \

@@ -4,8 +4,9 @@ use crate::{
     class_truth::ClassTruth,
     configuration, input,
     pipeline::{self, RunSetup},
-    record::RunRecord,
+    record::{RunRecord, SegmenterRecord},
     screen::Screen,
+    segmentation,
 };
 use anyhow::Result;
 use mte_slam_types::sequence::Sequence;
@@ -21,6 +22,8 @@ pub fn run(args: &DemoArgs, screen: Screen) -> Result<()> {
         dataset: "built-in".to_owned(),
         layout: sequence.info().layout.to_owned(),
         frames: sequence.info().frames,
+        segmenter: SegmenterRecord::of(&args.segmentation),
+        groups: args.segmentation.groups.clone(),
         ..RunRecord::default()
     };
     let default_out = Path::new("out").join(format!("demo-{}", effective.preset));
@@ -29,9 +32,18 @@ pub fn run(args: &DemoArgs, screen: Screen) -> Result<()> {
     } else {
         Ok(input::true_mesh(sequence.ground_truth_mesh()))
     };
-    let class_truth = ClassTruth::of_input("dataset", sequence.info());
+    let every = effective.config.mapping.every as usize;
+    let sequence = segmentation::labelled(Box::new(sequence), &args.segmentation, every, screen)?;
+    let truth = Box::new(input::built_in(args.frames, args.width));
+    let class_truth = match args.segmentation.segmenter {
+        None => ClassTruth::of_input("dataset", sequence.info()),
+        Some(_) => {
+            let truth = segmentation::grouped(truth, &args.segmentation)?;
+            ClassTruth::of_sequence("dataset", truth, sequence.info())?
+        }
+    };
     let setup = RunSetup {
-        sequence: Box::new(sequence),
+        sequence,
         record,
         effective,
         engine: &args.engine,

@@ -7,6 +7,7 @@ pub mod eval;
 pub mod evaluate;
 pub mod info;
 pub mod inspect;
+pub mod label;
 pub mod mesh;
 pub mod render;
 pub mod run;
