@@ -5,6 +5,9 @@ use mte_slam_segment::{MAX_MODEL_BYTES, ModelFiles, Segmented, Segmenter, Segmen
 use mte_slam_types::{groups::Groups, sequence::Sequence};
 use std::path::Path;
 
+/// Name of the network that the program carries.
+const BUILT_IN: &str = "built-in";
+
 /// The groups that `--groups` names.
 pub fn groups(args: &SegmenterArgs) -> Result<Option<Groups>> {
     let Some(name) = &args.groups else { return Ok(None) };
@@ -26,9 +29,13 @@ pub fn open(args: &SegmenterArgs, screen: Screen) -> Result<Option<Segmenter>> {
         }
         return Ok(None);
     };
-    // Loading takes about three times the file.
-    let free = memory::available_bytes().map_or(MAX_MODEL_BYTES, |bytes| bytes / 3);
-    let files = ModelFiles::open(Path::new(name), free.min(MAX_MODEL_BYTES))?;
+    let files = if name == BUILT_IN {
+        ModelFiles::built_in()
+    } else {
+        // Loading takes about three times the file.
+        let free = memory::available_bytes().map_or(MAX_MODEL_BYTES, |bytes| bytes / 3);
+        ModelFiles::open(Path::new(name), free.min(MAX_MODEL_BYTES))?
+    };
     let options = SegmenterOptions {
         size: args.segment_size,
         min_confidence: args.min_confidence,

@@ -34,6 +34,7 @@ pub fn render_views(
             folder.write(&format!("{stem}.{kind}.png"), bytes)
         })?;
         let (mut trained, labels) = score_view(scores, &frame, &mut view)?;
+        scores.follow(&trained, &view, &estimate.world_from_camera);
         let truth = scores.truth();
         let no_classes = ClassTable::default();
         trained.labels = trained.labels.map(|l| truth.of_map(&l));
@@ -70,7 +71,11 @@ pub fn render_frame(
 ) -> Result<(Frame, View)> {
     let name = sequence.info().name.clone();
     let camera = sequence.info().camera;
-    let frame = sequence.frame(estimate.frame).with_context(|| name)?;
+    let mut frame = sequence.frame(estimate.frame).with_context(|| name)?;
+    // A network labels the frames that are mapped, and others when asked.
+    if frame.labels.is_none() {
+        frame.labels = sequence.labels(estimate.frame)?;
+    }
     let view = block_on(slam.render(&estimate.world_from_camera, &camera))
         .with_context(|| format!("rendering frame {}", estimate.frame))?;
     Ok((frame, view))

@@ -7,6 +7,7 @@ extern crate alloc;
 
 mod boundary;
 mod bvh;
+mod consistency;
 mod distance;
 mod image;
 pub mod protocol;
@@ -18,6 +19,7 @@ mod trajectory;
 mod virtual_views;
 
 pub use boundary::{BOUNDARY_PIXELS, BoundaryMeter, BoundaryReport};
+pub use consistency::{ConsistencyMeter, ConsistencyReport};
 pub use distance::distances_to_surface;
 pub use image::{DepthMeter, DepthReport, MAX_PSNR_DB, PsnrMeter, PsnrReport};
 pub use semantic::{ConfusionMatrix, SMALL_SHARE_PERCENT, SemanticMeter, SemanticReport};

@@ -15,6 +15,8 @@ pub const PSNR_VIEWS: &str = "psnr/views@1";
 pub const MIOU: &str = "miou/all-images@1";
 /// [`crate::BoundaryMeter`].
 pub const BOUNDARY: &str = "boundary/3-pixels@1";
+/// [`crate::ConsistencyMeter`].
+pub const CONSISTENCY: &str = "class-changes/next-view@1";
 /// [`crate::evaluate_surface`], of meshes that are not known to be culled.
 pub const SURFACE: &str = "surface/as-given@1";
 

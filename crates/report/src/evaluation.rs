@@ -7,8 +7,8 @@ use crate::{
 use anyhow::{Context, Result};
 use mte_slam_core::slam::{PoseEstimate, View};
 use mte_slam_metrics::{
-    AteReport, ConfusionMatrix, DepthMeter, PosePair, PsnrMeter, SemanticMeter, TrajectoryError,
-    align_rigid, ate,
+    AteReport, ConfusionMatrix, ConsistencyMeter, DepthMeter, PosePair, PsnrMeter, SemanticMeter,
+    TrajectoryError, align_rigid, ate,
 };
 use mte_slam_odometry::ColorRegistration;
 use mte_slam_types::{
@@ -57,6 +57,8 @@ pub struct ViewScores {
     truth: ClassTruth,
     classes: SemanticMeter,
     input_labels: SemanticMeter,
+    changes: ConsistencyMeter,
+    input_changes: ConsistencyMeter,
     frames: Vec<usize>,
     info: SequenceInfo,
     registration: ColorRegistration,
@@ -75,6 +77,8 @@ impl ViewScores {
             color: PsnrMeter::default(),
             classes: SemanticMeter::new(truth.table.len()),
             input_labels: SemanticMeter::new(truth.table.len()),
+            changes: ConsistencyMeter::new(info.camera),
+            input_changes: ConsistencyMeter::new(info.camera),
             truth,
             frames: Vec::new(),
             info: info.clone(),
@@ -128,6 +132,17 @@ impl ViewScores {
         Ok(())
     }
 
+    /// Follows the classes of surfaces from the view before, of the map and of its labels: the view of `frame`
+    /// at a pose, both as [`score_view`] gives them. Without it there are no figures of changes.
+    pub fn follow(&mut self, frame: &Frame, view: &View, world_from_camera: &Pose) {
+        let unit = self.info.depth_unit_m;
+        let depth: Vec<f32> = frame.depth.iter().map(|d| (f64::from(*d) * unit) as f32).collect();
+        self.changes.add(&depth, world_from_camera, &view.class);
+        if let Some(labels) = &frame.labels {
+            self.input_changes.add(&depth, world_from_camera, labels);
+        }
+    }
+
     /// Classes that are scored, and the counts so far.
     pub fn confusion(&self) -> (&ClassTable, &ConfusionMatrix) {
         (&self.truth.table, self.classes.confusion())
@@ -162,6 +177,8 @@ impl ViewScores {
         };
         metrics.semantics = figures(&self.classes);
         metrics.input_labels = figures(&self.input_labels);
+        metrics.class_changes = self.changes.report();
+        metrics.input_class_changes = self.input_changes.report();
         if metrics.semantics.is_none() {
             let reason = self.truth.reason().unwrap_or("there are no labels");
             metrics.absent.insert("semantics", reason.to_owned());

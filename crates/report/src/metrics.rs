@@ -3,8 +3,8 @@
 use crate::{protocol::Protocol, timings::Spread};
 use mte_slam_core::map::AnchorCounts;
 use mte_slam_metrics::{
-    AteReport, BoundaryReport, DepthReport, MeshDepthReport, PsnrReport, SMALL_SHARE_PERCENT,
-    SemanticReport, SurfaceReport,
+    AteReport, BoundaryReport, ConsistencyReport, DepthReport, MeshDepthReport, PsnrReport,
+    SMALL_SHARE_PERCENT, SemanticReport, SurfaceReport,
 };
 use mte_slam_types::classes::{Class, ClassTable};
 use serde::Serialize;
@@ -49,6 +49,12 @@ pub struct Metrics {
     /// The labels that the map learnt from against the true labels, where those are others.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub input_labels: Option<SemanticFigures>,
+    /// How often the classes of a surface change from one rendered frame to the next: those of the map,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub class_changes: Option<ConsistencyReport>,
+    /// and those of the labels that it learnt from.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub input_class_changes: Option<ConsistencyReport>,
     /// Classes of one frame by SNI-SLAM's protocol, for comparison only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub semantics_sni: Option<SniFigures>,

@@ -131,6 +131,13 @@ impl Metrics {
                 row(&name, value, if i == 0 { protocol } else { "" });
             }
         }
+        if let Some(c) = &self.class_changes {
+            let next = "of surface points, from one rendered frame to the next";
+            row("classes that change", format!("{:.2} %", c.changed_percent), next);
+            if let Some(c) = &self.input_class_changes {
+                row("labels that change", format!("{:.2} %", c.changed_percent), "");
+            }
+        }
         for (how, report) in
             [("Co-SLAM", &self.mesh_coslam), ("ESLAM", &self.mesh), ("frustum", &self.mesh_frustum)]
         {

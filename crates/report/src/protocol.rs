@@ -40,6 +40,8 @@ pub enum Protocol {
     Boundary,
     /// Classes of one frame, as SNI-SLAM's script has them.
     Sni,
+    /// Classes of a surface from one view to the next.
+    Consistency,
     /// Views that a built-in scene gives near rendered frames.
     NovelNearFrames,
     /// Views of another recording in the same world.
@@ -85,7 +87,7 @@ pub struct UnknownProtocol(pub String);
 
 impl Protocol {
     /// Every protocol; those with a count once, with the usual one.
-    pub const ALL: [Protocol; 26] = [
+    pub const ALL: [Protocol; 27] = [
         Protocol::Trajectory,
         Protocol::Renders,
         Protocol::DepthViews,
@@ -94,6 +96,7 @@ impl Protocol {
         Protocol::Classes,
         Protocol::Boundary,
         Protocol::Sni,
+        Protocol::Consistency,
         Protocol::NovelNearFrames,
         Protocol::NovelRecording,
         Protocol::Anchors,
@@ -125,6 +128,7 @@ impl Protocol {
             Protocol::Classes => protocol::MIOU,
             Protocol::Boundary => protocol::BOUNDARY,
             Protocol::Sni => "miou/sni-first-frame@1",
+            Protocol::Consistency => protocol::CONSISTENCY,
             Protocol::NovelNearFrames => "novel/near-frames@1",
             Protocol::NovelRecording => "novel/recording@1",
             Protocol::Anchors => "anchors/after-calls@1",
@@ -178,6 +182,9 @@ impl Protocol {
             Protocol::Sni => {
                 "SNI-SLAM's script: the first frame alone, at its true pose and with its true \
                  depth; for comparison with that paper only"
+            }
+            Protocol::Consistency => {
+                "share of surface points whose class differs in the next view; needs no truth"
             }
             Protocol::NovelNearFrames => "views ray-cast from the scene, near rendered frames",
             Protocol::NovelRecording => "views of a recording that the map has not seen",

@@ -27,6 +27,18 @@ pub struct ModelFiles {
 }
 
 impl ModelFiles {
+    /// The network that comes with this crate, for the built-in rooms: see its
+    /// [model card](https://docs.rs/crate/mte-slam-segment/latest/source/models/built-in/README.md).
+    #[cfg(feature = "built-in")]
+    pub fn built_in() -> ModelFiles {
+        ModelFiles {
+            name: "built-in".into(),
+            onnx: include_bytes!("../models/built-in/model.onnx").to_vec(),
+            config: Some(include_str!("../models/built-in/config.json").into()),
+            preprocessor: Some(include_str!("../models/built-in/preprocessor_config.json").into()),
+        }
+    }
+
     /// Reads a folder with `model.onnx` (or `onnx/model.onnx`, or a single `.onnx`), or an `.onnx` file.
     /// The two JSON files are looked for beside it and one folder up.
     ///

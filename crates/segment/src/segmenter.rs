@@ -316,7 +316,17 @@ fn table_of(
             "each once",
         ));
     }
-    let table = ClassTable { classes };
+    // In the order of their ids, as lists of data sets are.
+    let mut order: Vec<usize> = (0..classes.len()).collect();
+    order.sort_by_key(|&i| classes[i].raw_id);
+    let mut places = vec![0u8; classes.len()];
+    order.iter().enumerate().for_each(|(place, &i)| places[i] = place as u8);
+    for target in &mut targets {
+        if let Target::Class(c) = target {
+            *c = places[usize::from(*c)];
+        }
+    }
+    let table = ClassTable { classes: order.iter().map(|&i| classes[i].clone()).collect() };
     let Some(groups) = groups else { return Ok((table, targets)) };
     let (merged, map) = groups.merge(&table);
     if merged.is_empty() {

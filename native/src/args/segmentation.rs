@@ -7,10 +7,11 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, Default, PartialEq, Args)]
 pub struct SegmenterArgs {
     /// Take classes from a segmentation network in place of --labels: an .onnx file, or a folder with
-    /// model.onnx, beside which config.json and preprocessor_config.json may say how it is used.
+    /// model.onnx, beside which config.json and preprocessor_config.json may say how it is used; or
+    /// `built-in`, a small one that knows the rooms of `demo` and `synth`, and no real ones.
     #[arg(
         long,
-        value_name = "MODEL",
+        value_name = "MODEL|built-in",
         value_hint = ValueHint::AnyPath,
         help_heading = "Segmentation"
     )]

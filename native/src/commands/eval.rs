@@ -231,7 +231,10 @@ fn evaluate_renders(
     for (i, &index) in rendered.iter().enumerate() {
         let truth = scores.truth();
         let view = read_view(&folder, index, &info, &truth.table, unlabelled)?;
-        let frame = sequence.frame(index)?;
+        let mut frame = sequence.frame(index)?;
+        if frame.labels.is_none() {
+            frame.labels = sequence.labels(index)?;
+        }
         let (frame, labels) = scores.registered(&frame)?;
         scores.add(&frame, &view, labels.as_deref())?;
         progress.set(i as u64 + 1, String::new);

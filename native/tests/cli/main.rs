@@ -12,5 +12,6 @@ mod protocols;
 mod python;
 mod refusals;
 mod resume;
+mod segmenter;
 mod serve;
 mod settings;
