@@ -409,6 +409,40 @@ mod tests {
     }
 
     #[test]
+    fn one_node_a_part() {
+        let mesh = colored();
+        let extras = vec![
+            ("id", GlbExtra::Number(3.0)),
+            ("class", GlbExtra::Text("a \"chair\"")),
+            ("structure", GlbExtra::Flag(false)),
+        ];
+        let node = |name, triangles| GlbNode { name, triangles, extras: extras.clone() };
+        let nodes = [node("chair 1", &[0, 1][..]), node("none", &[]), node("chair 2", &[7])];
+        let glb = write_glb_nodes(&mesh, &nodes).unwrap();
+        let json = core::str::from_utf8(chunk(&glb, 12, b"JSON")).unwrap();
+        let json: serde_json::Value = serde_json::from_str(json).unwrap();
+        assert_eq!(json["scenes"][0]["nodes"], serde_json::json!([0, 1, 2]));
+        assert_eq!(json["nodes"][0]["name"], "chair 1");
+        assert_eq!(json["nodes"][0]["mesh"], 0);
+        assert!(json["nodes"][1]["mesh"].is_null());
+        assert_eq!(json["nodes"][2]["mesh"], 1);
+        let expected = serde_json::json!({"id": 3, "class": "a \"chair\"", "structure": false});
+        assert_eq!(json["nodes"][2]["extras"], expected);
+        assert_eq!(json["meshes"].as_array().unwrap().len(), 2);
+        assert_eq!(json["materials"].as_array().unwrap().len(), 1);
+        let attributes = &json["meshes"][1]["primitives"][0]["attributes"];
+        let position = attributes["POSITION"].as_u64().unwrap() as usize;
+        assert_eq!(json["accessors"][position]["count"], 3);
+        assert!(attributes["COLOR_0"].is_u64());
+        let mut bad = nodes.clone();
+        bad[0].triangles = &[8];
+        assert!(write_glb_nodes(&mesh, &bad).is_err());
+        bad[0] = GlbNode { extras: vec![("x", GlbExtra::Number(f64::NAN))], ..node("a", &[0]) };
+        assert!(write_glb_nodes(&mesh, &bad).is_err());
+        assert!(write_glb_nodes(&mesh, &[]).is_ok());
+    }
+
+    #[test]
     fn empty_and_bad_meshes() {
         let glb = write_glb(&Mesh::default()).unwrap();
         assert_eq!(glb.len(), 20 + chunk(&glb, 12, b"JSON").len());

@@ -26,5 +26,5 @@ pub use error::ObjectsError;
 pub use nodes::write_objects_glb;
 pub use objects::{ConfidenceSource, LeftOut, NO_OBJECT, Object, Objects, find_objects};
 pub use options::ObjectOptions;
-pub use overlap::{ClassBox, Overlap, OverlapPair, box_overlap, class_boxes};
+pub use overlap::{ClassBox, Overlap, OverlapPair, box_overlap, class_boxes, group_boxes};
 pub use ply_classes::{class_mesh, ply_classes};

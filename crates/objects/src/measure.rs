@@ -1,14 +1,11 @@
 //! What is measured of one part.
 use crate::{axes::RoomAxes, bounds::RoomBox, visible::visible_share};
-use glam::DVec3;
 use mte_slam_mesh::Mesh;
 
 /// Figures of one part of a mesh.
 pub struct Measures {
     /// Surface \[m2\].
     pub area_m2: f64,
-    /// Centroid of the surface in the world \[m\].
-    pub centroid_m: DVec3,
     /// Smallest box along the room's axes.
     pub bounds: RoomBox,
     /// Mean over the corners that have the class, weighted by area, 0 to 1.
@@ -49,21 +46,16 @@ pub fn measure(
     light: &Light,
 ) -> Measures {
     let mut bounds = RoomBox::empty();
-    let (mut area_m2, mut moment, mut mean, mut corners) = (0.0, DVec3::ZERO, DVec3::ZERO, 0);
+    let mut area_m2 = 0.0;
     let (mut sure, mut sure_weight) = (0.0, 0.0);
     let mut color = [0.0; 3];
     let mut in_room = Vec::with_capacity(triangles.len());
     for &t in triangles {
-        let points = mesh.corners(t as usize);
         let area = mesh.triangle_area(t as usize);
-        let local = points.map(|p| axes.to_room(p));
+        let local = mesh.corners(t as usize).map(|p| axes.to_room(p));
         local.iter().for_each(|p| bounds.include(*p));
         in_room.push(local);
-        let middle = (points[0] + points[1] + points[2]) / 3.0;
         area_m2 += area;
-        moment += area * middle;
-        mean += middle;
-        corners += 1;
         for v in mesh.triangles[t as usize].map(|v| v as usize) {
             if mesh.classes[v] == class {
                 sure += area * f64::from(confidence[v]);
@@ -76,14 +68,12 @@ pub fn measure(
             }
         }
     }
-    let has_area = area_m2 > 0.0;
     Measures {
         area_m2,
-        centroid_m: if has_area { moment / area_m2 } else { mean / f64::from(corners.max(1)) },
         visible_share: visible_share(&in_room, &bounds),
         bounds,
         confidence: if sure_weight > 0.0 { (sure / sure_weight).clamp(0.0, 1.0) } else { 0.0 },
-        color: (has_area && !mesh.colors.is_empty())
+        color: (area_m2 > 0.0 && !mesh.colors.is_empty())
             .then(|| color.map(|c| light.byte(c / (3.0 * area_m2)))),
     }
 }

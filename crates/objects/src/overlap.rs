@@ -1,5 +1,12 @@
 //! Objects against true ones: precision and recall by the overlap of boxes.
-use crate::{bounds::RoomBox, objects::Objects};
+use crate::{
+    axes::RoomAxes,
+    bounds::RoomBox,
+    error::{ObjectsError, invalid},
+    objects::Objects,
+};
+use mte_slam_mesh::Mesh;
+use std::collections::BTreeMap;
 
 /// A box and its class, of an object that was found or of a true one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,6 +55,30 @@ impl Overlap {
 pub fn class_boxes(objects: &Objects) -> Vec<ClassBox> {
     let things = objects.objects.iter().filter(|o| !o.structure);
     things.map(|o| ClassBox { class_id: o.class_id, bounds: o.bounds }).collect()
+}
+
+/// Returns the boxes of groups of triangles, such as the true objects of a made scene, in the order of
+/// their numbers. `group` gives each triangle's number and class id, or `None` where it does not count.
+///
+/// # Errors
+/// A mesh that fails [`Mesh::check`], or a group with triangles of two classes.
+pub fn group_boxes(
+    mesh: &Mesh,
+    axes: &RoomAxes,
+    group: impl Fn(usize) -> Option<(u32, u16)>,
+) -> Result<Vec<ClassBox>, ObjectsError> {
+    mesh.check()?;
+    let mut boxes: BTreeMap<u32, ClassBox> = BTreeMap::new();
+    for t in 0..mesh.triangles.len() {
+        let Some((number, class_id)) = group(t) else { continue };
+        let entry = boxes.entry(number).or_insert(ClassBox { class_id, bounds: RoomBox::empty() });
+        if entry.class_id != class_id {
+            let found = format!("classes {} and {class_id}", entry.class_id);
+            return Err(invalid(format!("group {number}"), found, "one class"));
+        }
+        mesh.corners(t).into_iter().for_each(|p| entry.bounds.include(axes.to_room(p)));
+    }
+    Ok(boxes.into_values().collect())
 }
 
 /// Matches found objects with true ones of the same class, greedily: of all pairs whose boxes
