@@ -10,7 +10,7 @@
 use mte_slam_mesh::Mesh;
 use mte_slam_objects::{
     ClassBox, NO_OBJECT, ObjectOptions, Objects, box_overlap, class_boxes, class_mesh,
-    find_objects, group_boxes,
+    find_objects, group_boxes, ply_classes,
 };
 use mte_slam_synth::{SceneKind, SyntheticMesh, SyntheticOptions, SyntheticSequence};
 use mte_slam_types::{
@@ -49,8 +49,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let [_, out, _, _] = &arguments[..] else { return Ok(()) };
     let out = Path::new(out);
-    let (mesh, classes) =
-        class_mesh(&fs::read(out.join("mesh.ply"))?, &fs::read(out.join("mesh_semantic.ply"))?)?;
+    let classes = ply_classes(&fs::read(out.join("mesh_semantic.ply"))?)?;
+    let mesh = class_mesh(&fs::read(out.join("mesh.ply"))?, &classes)?;
     let found = find_objects(&mesh, &classes, None, &settings)?;
     println!("\n{} run, all true objects", scene.name());
     compare(&found, &truth(&built, &true_mesh, &found, &table, None)?, &table);

@@ -120,8 +120,8 @@ pub fn level_up(mesh: &Mesh, near: DVec3) -> Result<DVec3, ObjectsError> {
 }
 
 fn unit(up: DVec3) -> Result<DVec3, ObjectsError> {
-    // Written so that NaN fails.
-    if !((up.length() - 1.0).abs() <= 1e-3) {
+    // A range, so that NaN fails.
+    if !(0.999..=1.001).contains(&up.length()) {
         return Err(invalid("up", format!("{up}"), "a vector of length 1"));
     }
     Ok(up.normalize())

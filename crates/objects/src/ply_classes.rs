@@ -44,13 +44,12 @@ pub fn ply_classes(bytes: &[u8]) -> Result<ClassTable, ObjectsError> {
     Ok(table)
 }
 
-/// Returns the mesh of a run with its colors and compact classes, from `mesh.ply`, and the classes,
-/// from the header of `mesh_semantic.ply`.
+/// Reads a run's `mesh.ply`, which has colors and compact classes, and checks its classes against the
+/// table.
 ///
 /// # Errors
 /// A file that cannot be read, a mesh without classes, or a class that the table does not have.
-pub fn class_mesh(ply: &[u8], semantic: &[u8]) -> Result<(Mesh, ClassTable), ObjectsError> {
-    let table = ply_classes(semantic)?;
+pub fn class_mesh(ply: &[u8], table: &ClassTable) -> Result<Mesh, ObjectsError> {
     let mesh = read_ply(ply)?;
     if mesh.classes.len() != mesh.positions.len() || mesh.positions.is_empty() {
         let found = if mesh.positions.is_empty() { "no vertices" } else { "none" };
@@ -59,8 +58,8 @@ pub fn class_mesh(ply: &[u8], semantic: &[u8]) -> Result<(Mesh, ClassTable), Obj
     let known = |c: u8| c == UNLABELLED || usize::from(c) < table.len();
     if let Some(i) = mesh.classes.iter().position(|&c| !known(c)) {
         let found = format!("class {}", mesh.classes[i]);
-        let expected = format!("one of the {} classes of mesh_semantic.ply", table.len());
+        let expected = format!("one of the {} classes of the table", table.len());
         return Err(invalid(format!("vertex {i}"), found, expected));
     }
-    Ok((mesh, table))
+    Ok(mesh)
 }

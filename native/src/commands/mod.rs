@@ -8,6 +8,7 @@ pub mod evaluate;
 pub mod info;
 pub mod inspect;
 pub mod mesh;
+pub mod objects;
 pub mod render;
 pub mod run;
 pub mod serve;
