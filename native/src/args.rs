@@ -2,6 +2,7 @@
 //! what a command does, what it writes, and an example to copy.
 mod engine;
 mod evaluation;
+mod objects;
 mod recording;
 mod segmentation;
 mod suite;
@@ -10,6 +11,7 @@ mod values;
 use crate::invocation::Invocation;
 pub use engine::{EngineArgs, EngineChoice};
 pub use evaluation::{CullChoice, EvalArgs, InferenceChoice, MiouProtocol};
+pub use objects::ObjectsArgs;
 pub use recording::{
     ClassArgs, ColorChoice, ConvertArgs, InspectArgs, SelectionArgs, SensorArgs, TargetLayout,
 };
@@ -110,6 +112,9 @@ pub enum Command {
         Example:\n    mte-slam mesh out/room0-replica --resolution 0.01"
     )]
     Mesh(MeshArgs),
+    /// List the things in an output folder's mesh, with boxes, and write each as a part of its own
+    #[command(long_about = objects::OBJECTS)]
+    Objects(ObjectsArgs),
     /// Render colour, depth and classes of an output folder's map from any pose
     #[command(
         long_about = "Render colour, depth and classes from an output folder's checkpoint, without \

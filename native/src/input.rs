@@ -263,7 +263,7 @@ pub fn built_in(frames: usize, width: u32) -> SyntheticSequence {
 
 /// The built-in sequence's mesh as the core's mesh type; a vertex takes the class of its faces.
 pub fn true_mesh(synthetic: SyntheticMesh) -> MeshTruth {
-    let SyntheticMesh { positions, triangles, face_class, colors } = synthetic;
+    let SyntheticMesh { positions, triangles, face_class, colors, .. } = synthetic;
     let mut classes = vec![UNLABELLED; positions.len()];
     for (triangle, class) in triangles.iter().zip(face_class) {
         for &i in triangle {

@@ -52,6 +52,7 @@ fn follow(cli: &Cli) -> anyhow::Result<()> {
         Command::Run(args) => commands::run::run(args, screen),
         Command::Eval(args) => commands::eval::run(args, screen),
         Command::Mesh(args) => commands::mesh::run(args, screen),
+        Command::Objects(args) => commands::objects::run(args, screen),
         Command::Render(args) => commands::render::run(args, screen),
         Command::Synth(args) => commands::synth::run(args, screen),
         Command::Inspect(args) => commands::inspect::run(args, screen),

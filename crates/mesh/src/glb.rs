@@ -10,7 +10,7 @@ use alloc::{
     string::{String, ToString},
     vec::Vec,
 };
-use mte_slam_types::classes::ClassTable;
+use mte_slam_types::classes::{ClassTable, UNLABELLED};
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
@@ -20,6 +20,30 @@ const U16: u32 = 5123;
 const U32: u32 = 5125;
 const F32: u32 = 5126;
 const UNLIT: &str = "KHR_materials_unlit";
+// The colours are as photographed, lighting included: viewers that can show them unlit.
+const VERTEX_COLORS: &str = r#"{"name":"vertex colours","doubleSided":true,"pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":1},"extensions":{"KHR_materials_unlit":{}}}"#;
+
+/// A value in the `extras` of a node.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum GlbExtra<'a> {
+    /// A number; it must be finite.
+    Number(f64),
+    /// A text.
+    Text(&'a str),
+    /// True or false.
+    Flag(bool),
+}
+
+/// A part of a mesh that becomes a node of its own.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GlbNode<'a> {
+    /// The node's name.
+    pub name: &'a str,
+    /// Indices of its triangles in the mesh.
+    pub triangles: &'a [u32],
+    /// Keys and values of its `extras`.
+    pub extras: Vec<(&'a str, GlbExtra<'a>)>,
+}
 
 /// The mesh with POSITION, NORMAL and COLOR_0 as far as it has them, as one primitive.
 ///
@@ -29,10 +53,8 @@ pub fn write_glb(mesh: &Mesh) -> Result<Vec<u8>, MeshError> {
     mesh.check()?;
     let mut glb = Glb::default();
     glb.add_vertices(mesh, true)?;
-    // The colours are as photographed, lighting included: viewers that can show them unlit.
-    let material = r#"{"name":"vertex colours","doubleSided":true,"pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":1},"extensions":{"KHR_materials_unlit":{}}}"#;
     let indices: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
-    glb.add_primitive(&indices, material);
+    glb.add_primitive(&indices, VERTEX_COLORS);
     glb.finish()
 }
 
@@ -48,9 +70,9 @@ pub fn write_glb_by_class(mesh: &Mesh, classes: &ClassTable) -> Result<Vec<u8>, 
     }
     let mut glb = Glb::default();
     let mut by_class: BTreeMap<u8, Vec<u32>> = BTreeMap::new();
-    for t in &mesh.triangles {
-        let [a, b, c] = t.map(|i| mesh.classes[i as usize]);
-        by_class.entry(if b == c { b } else { a }).or_default().extend(t);
+    for (i, t) in mesh.triangles.iter().enumerate() {
+        let class = mesh.triangle_class(i).unwrap_or(UNLABELLED);
+        by_class.entry(class).or_default().extend(t);
     }
     for (class, indices) in by_class {
         let (name, color) = match classes.classes.get(class as usize) {
@@ -70,6 +92,53 @@ pub fn write_glb_by_class(mesh: &Mesh, classes: &ClassTable) -> Result<Vec<u8>, 
     glb.finish()
 }
 
+/// Returns parts of the mesh as nodes of one scene, each with a mesh of its own that holds the vertices
+/// it uses, with colours as [`write_glb`] has them. A node without triangles has no mesh.
+///
+/// # Errors
+/// As [`write_glb`], or a triangle that the mesh does not have, or a number that is not finite.
+pub fn write_glb_nodes(mesh: &Mesh, nodes: &[GlbNode<'_>]) -> Result<Vec<u8>, MeshError> {
+    mesh.check()?;
+    let mut glb = Glb::default();
+    for node in nodes {
+        let mut corners = Vec::with_capacity(node.triangles.len().saturating_mul(3));
+        for &t in node.triangles {
+            let Some(triangle) = mesh.triangles.get(t as usize) else {
+                let expected = format!("less than {}", mesh.triangles.len());
+                return Err(invalid("triangle of a node", t, &expected));
+            };
+            corners.extend_from_slice(triangle);
+        }
+        let mut extras = Vec::new();
+        for (key, value) in &node.extras {
+            let value = match value {
+                GlbExtra::Number(x) if x.is_finite() => format!("{x}"),
+                GlbExtra::Number(x) => {
+                    return Err(invalid("extra of a node", x, "a finite number"));
+                }
+                GlbExtra::Text(text) => quoted(text),
+                GlbExtra::Flag(flag) => format!("{flag}"),
+            };
+            extras.push(format!("{}:{value}", quoted(key)));
+        }
+        let (part, indices) = part_of(mesh, &corners);
+        glb.add_vertices(&part, true)?;
+        let before = glb.primitives.len();
+        glb.add_primitive_with(&indices, VERTEX_COLORS, 0);
+        let shape = if glb.primitives.len() > before {
+            format!(r#","mesh":{before}"#)
+        } else {
+            String::new()
+        };
+        glb.nodes.push(format!(
+            r#"{{"name":{}{shape},"extras":{{{}}}}}"#,
+            quoted(node.name),
+            extras.join(",")
+        ));
+    }
+    glb.finish()
+}
+
 /// Returns the vertices that the corners of some triangles use, and the corners' indices among them.
 fn part_of(mesh: &Mesh, corners: &[u32]) -> (Mesh, Vec<u32>) {
     let mut part = Mesh::default();
@@ -80,6 +149,7 @@ fn part_of(mesh: &Mesh, corners: &[u32]) -> (Mesh, Vec<u32>) {
             *place.entry(i).or_insert_with(|| {
                 part.positions.push(mesh.positions[i as usize]);
                 part.normals.extend(mesh.normals.get(i as usize));
+                part.colors.extend(mesh.colors.get(i as usize));
                 part.positions.len() as u32 - 1
             })
         })
@@ -123,6 +193,8 @@ struct Glb {
     primitives: Vec<String>,
     materials: Vec<String>,
     attributes: String,
+    /// Nodes with a mesh per primitive; without any, one node shows all primitives.
+    nodes: Vec<String>,
 }
 
 impl Glb {
@@ -189,17 +261,42 @@ impl Glb {
     }
 
     fn add_primitive(&mut self, indices: &[u32], material: &str) {
+        self.add_primitive_with(indices, material, self.materials.len());
+    }
+
+    /// Adds a primitive with the material of this index, which is added if it is the next one.
+    fn add_primitive_with(&mut self, indices: &[u32], material: &str, index: usize) {
         if indices.is_empty() {
             return; // accessors of nothing are not allowed
         }
         let data = bytemuck::cast_slice(indices);
         let accessor = self.accessor(data, INDICES, U32, "SCALAR", indices.len(), "");
-        self.materials.push(material.into());
+        if index == self.materials.len() {
+            self.materials.push(material.into());
+        }
         self.primitives.push(format!(
-            r#"{{"attributes":{{{}}},"indices":{accessor},"material":{}}}"#,
-            self.attributes,
-            self.materials.len() - 1
+            r#"{{"attributes":{{{}}},"indices":{accessor},"material":{index}}}"#,
+            self.attributes
         ));
+    }
+
+    /// The scene, its nodes and their meshes.
+    fn scene(&self) -> String {
+        if self.nodes.is_empty() {
+            return format!(
+                r#""scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{}]}}]"#,
+                self.primitives.join(",")
+            );
+        }
+        let numbers: Vec<String> = (0..self.nodes.len()).map(|i| i.to_string()).collect();
+        let meshes: Vec<String> =
+            self.primitives.iter().map(|p| format!(r#"{{"primitives":[{p}]}}"#)).collect();
+        format!(
+            r#""scene":0,"scenes":[{{"nodes":[{}]}}],"nodes":[{}],"meshes":[{}]"#,
+            numbers.join(","),
+            self.nodes.join(","),
+            meshes.join(",")
+        )
     }
 
     fn finish(self) -> Result<Vec<u8>, MeshError> {
@@ -211,8 +308,8 @@ impl Glb {
                 json += &format!(r#","extensionsUsed":["{UNLIT}"]"#);
             }
             json += &format!(
-                r#","scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{}]}}],"materials":[{}],"accessors":[{}],"bufferViews":[{}],"buffers":[{{"byteLength":{}}}]}}"#,
-                self.primitives.join(","),
+                r#",{},"materials":[{}],"accessors":[{}],"bufferViews":[{}],"buffers":[{{"byteLength":{}}}]}}"#,
+                self.scene(),
                 self.materials.join(","),
                 self.accessors.join(","),
                 self.views.join(","),
@@ -309,6 +406,40 @@ mod tests {
             .collect();
         assert_eq!(vertices, [5, 7, 5]);
         assert!(write_glb_by_class(&square(1, 1.0, 0.0), &table).is_err());
+    }
+
+    #[test]
+    fn one_node_a_part() {
+        let mesh = colored();
+        let extras = vec![
+            ("id", GlbExtra::Number(3.0)),
+            ("class", GlbExtra::Text("a \"chair\"")),
+            ("structure", GlbExtra::Flag(false)),
+        ];
+        let node = |name, triangles| GlbNode { name, triangles, extras: extras.clone() };
+        let nodes = [node("chair 1", &[0, 1][..]), node("none", &[]), node("chair 2", &[7])];
+        let glb = write_glb_nodes(&mesh, &nodes).unwrap();
+        let json = core::str::from_utf8(chunk(&glb, 12, b"JSON")).unwrap();
+        let json: serde_json::Value = serde_json::from_str(json).unwrap();
+        assert_eq!(json["scenes"][0]["nodes"], serde_json::json!([0, 1, 2]));
+        assert_eq!(json["nodes"][0]["name"], "chair 1");
+        assert_eq!(json["nodes"][0]["mesh"], 0);
+        assert!(json["nodes"][1]["mesh"].is_null());
+        assert_eq!(json["nodes"][2]["mesh"], 1);
+        let expected = serde_json::json!({"id": 3, "class": "a \"chair\"", "structure": false});
+        assert_eq!(json["nodes"][2]["extras"], expected);
+        assert_eq!(json["meshes"].as_array().unwrap().len(), 2);
+        assert_eq!(json["materials"].as_array().unwrap().len(), 1);
+        let attributes = &json["meshes"][1]["primitives"][0]["attributes"];
+        let position = attributes["POSITION"].as_u64().unwrap() as usize;
+        assert_eq!(json["accessors"][position]["count"], 3);
+        assert!(attributes["COLOR_0"].is_u64());
+        let mut bad = nodes.clone();
+        bad[0].triangles = &[8];
+        assert!(write_glb_nodes(&mesh, &bad).is_err());
+        bad[0] = GlbNode { extras: vec![("x", GlbExtra::Number(f64::NAN))], ..node("a", &[0]) };
+        assert!(write_glb_nodes(&mesh, &bad).is_err());
+        assert!(write_glb_nodes(&mesh, &[]).is_ok());
     }
 
     #[test]

@@ -19,7 +19,7 @@ mod tables;
 pub use components::{ComponentSize, components};
 pub use cull::{CullProtocol, CullingView, Keep, Visibility, cull, in_any_frustum, observed_part};
 pub use depth::DepthRenderer;
-pub use glb::{write_glb, write_glb_by_class};
+pub use glb::{GlbExtra, GlbNode, write_glb, write_glb_by_class, write_glb_nodes};
 pub use marching::{Block, BlockMesher};
 pub use ply_read::{PlyError, read_ply};
 pub use ply_write::{write_ply, write_ply_by_class};
@@ -107,6 +107,13 @@ impl Mesh {
     pub fn triangle_area(&self, t: usize) -> f64 {
         let [a, b, c] = self.corners(t);
         (b - a).cross(c - a).length() * 0.5
+    }
+
+    /// Returns the class of triangle `t`: of most of its vertices, else of its first; `None` where the
+    /// mesh has no classes.
+    pub fn triangle_class(&self, t: usize) -> Option<u8> {
+        let [a, b, c] = self.triangles[t].map(|i| self.classes.get(i as usize).copied());
+        if b == c { b } else { a }
     }
 
     /// Returns the total area \[m2\].

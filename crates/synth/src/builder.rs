@@ -21,7 +21,13 @@ pub struct Builder {
     pub lights: Vec<Light>,
     origin: Vec3,
     turn: Mat3,
+    /// The thing that following solids are of, and the number of things so far.
+    object: u32,
+    objects: u32,
 }
+
+/// Things that the shell of a room consists of: walls, floor and ceiling.
+const SHELL_OBJECTS: [u32; 6] = [0, 0, 0, 0, 1, 2];
 
 /// Returns a linear colour from an sRGB one (with the gamma of 2 that the renderer uses).
 pub fn rgb(c: [u8; 3]) -> Vec3 {
@@ -53,7 +59,21 @@ impl Builder {
             lights: Vec::new(),
             origin: Vec3::ZERO,
             turn: Mat3::IDENTITY,
+            object: 0,
+            objects: 3,
         }
+    }
+
+    /// Following solids are of a new thing. Returns its number, for [`Builder::go_on`].
+    pub fn begin(&mut self) -> u32 {
+        self.object = self.objects;
+        self.objects += 1;
+        self.object
+    }
+
+    /// Following solids are of a thing that was begun before.
+    pub fn go_on(&mut self, object: u32) {
+        self.object = object;
     }
 
     /// Following solids stand at `origin`, turned by `degrees` about z.
@@ -107,6 +127,7 @@ impl Builder {
             half,
             material: [paint; 6],
             class: [kind as u8; 6],
+            object: [self.object; 6],
         });
         let last = self.primitives.len() - 1;
         &mut self.primitives[last]
@@ -182,6 +203,7 @@ pub fn shell(size: [f32; 3], walls: [u16; 4], floor: u16, ceiling: u16) -> Primi
         half,
         material: [walls[0], walls[1], walls[2], walls[3], floor, ceiling],
         class: [wall, wall, wall, wall, Kind::floor as u8, Kind::ceiling as u8],
+        object: SHELL_OBJECTS,
     }
 }
 

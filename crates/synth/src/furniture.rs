@@ -36,6 +36,7 @@ fn tint(b: &mut Builder, color: [u8; 3]) -> [u8; 3] {
 
 /// A table with four legs.
 pub fn table(b: &mut Builder, top: u16, legs: u16, size: [f32; 3]) {
+    b.begin();
     let [x, y, h] = [0.5 * size[0], 0.5 * size[1], size[2]];
     b.block(Kind::table, top, [-x, -y, h - 0.035], [x, y, h]);
     b.block(
@@ -58,6 +59,7 @@ pub fn table(b: &mut Builder, top: u16, legs: u16, size: [f32; 3]) {
 
 /// A wooden chair, its back at +y.
 pub fn chair(b: &mut Builder, wood: u16, seat: u16) {
+    b.begin();
     b.block(Kind::chair, seat, [-0.21, -0.21, 0.435], [0.21, 0.21, 0.475]);
     for (x, y, h) in
         [(-0.19, -0.19, 0.4349), (0.19, -0.19, 0.4349), (-0.19, 0.19, 0.92), (0.19, 0.19, 0.92)]
@@ -72,6 +74,7 @@ pub fn chair(b: &mut Builder, wood: u16, seat: u16) {
 
 /// A desk chair on castors, its back at +y.
 pub fn office_chair(b: &mut Builder, cloth: u16, metal: u16) {
+    b.begin();
     for i in 0..5 {
         let turn = yaw(72.0 * i as f32 + 20.0);
         let c = turn * Vec3::new(0.14, 0.0, 0.09);
@@ -91,6 +94,7 @@ pub fn office_chair(b: &mut Builder, cloth: u16, metal: u16) {
 
 /// A sofa against a wall at y = 0.44, `width` wide, with cushions.
 pub fn sofa(b: &mut Builder, cloth: u16, width: f32, cushions: &[u16]) {
+    b.begin();
     let w = 0.5 * width;
     let dark = b.paint(Pattern::Wood, [60, 40, 28], [90, 62, 40], 1.5);
     b.block(Kind::sofa, cloth, [-w, -0.42, 0.09], [w, 0.42, 0.28]);
@@ -117,6 +121,7 @@ pub fn sofa(b: &mut Builder, cloth: u16, width: f32, cushions: &[u16]) {
         let x = (w - 0.42) * (2.0 * part - 1.0) + b.rng.range(-0.04, 0.04);
         let roll = b.rng.range(-18.0, 18.0);
         let turn = yaw(roll) * pitch(-24.0);
+        b.begin();
         b.ellipsoid(Kind::cushion, paint, [x, 0.10, 0.62], [0.235, 0.10, 0.215], turn);
     }
 }
@@ -137,6 +142,7 @@ pub fn books(b: &mut Builder, range: [f32; 2], front: f32, z: f32, tall: f32) {
         let ink = b.rng.pick(&inks);
         let cover = tint(b, cover);
         let paint = b.paint(Pattern::Spine, cover, ink, 1.0);
+        b.begin();
         b.block(
             Kind::book,
             paint,
@@ -160,6 +166,7 @@ pub fn book_stack(b: &mut Builder, at: [f32; 3], count: usize) {
         let paint = b.paint(Pattern::Spine, cover, [235, 225, 200], 1.0);
         let turn = yaw(b.rng.range(-25.0, 25.0));
         let half = [b.rng.range(0.10, 0.13), b.rng.range(0.075, 0.095), 0.5 * h];
+        b.begin();
         b.tilted(Kind::book, paint, [at[0], at[1], z + 0.5 * h], half, turn);
         z += h + 0.0005;
     }
@@ -169,6 +176,7 @@ pub fn book_stack(b: &mut Builder, at: [f32; 3], count: usize) {
 pub fn bookcase(b: &mut Builder, wood: u16, size: [f32; 3], boards: usize) {
     let [x, d, h] = [0.5 * size[0], 0.5 * size[1], size[2]];
     let back = b.paint(Pattern::Wood, [110, 80, 52], [138, 104, 70], 1.0);
+    let case = b.begin();
     b.block(Kind::shelf, back, [-x, d - 0.012, 0.0], [x, d, h]);
     for s in [-1.0f32, 1.0] {
         b.block(
@@ -181,6 +189,7 @@ pub fn bookcase(b: &mut Builder, wood: u16, size: [f32; 3], boards: usize) {
     let pitch_z = (h - 0.1) / boards as f32;
     for i in 0..=boards {
         let z = 0.05 + pitch_z * i as f32;
+        b.go_on(case);
         b.block(
             Kind::shelf,
             wood,
@@ -205,6 +214,7 @@ pub fn bookcase(b: &mut Builder, wood: u16, size: [f32; 3], boards: usize) {
 
 /// A low cabinet with doors, against a wall at y = depth / 2.
 pub fn cabinet(b: &mut Builder, wood: u16, front: u16, size: [f32; 3], doors: usize) {
+    b.begin();
     let [x, d, h] = [0.5 * size[0], 0.5 * size[1], size[2]];
     let knob = b.paint(Pattern::Plain, STEEL, STEEL, 4.0);
     b.block(Kind::cabinet, wood, [-x + 0.03, -d + 0.04, 0.0], [x - 0.03, d, 0.0799]);
@@ -232,6 +242,7 @@ pub fn cabinet(b: &mut Builder, wood: u16, front: u16, size: [f32; 3], doors: us
 
 /// A lamp on the floor.
 pub fn floor_lamp(b: &mut Builder) {
+    b.begin();
     let metal = b.paint(Pattern::Plain, BLACK, BLACK, 3.0);
     let shade = b.glowing([250, 225, 180], 1.1);
     b.cone(Kind::lamp, metal, [0.0; 3], [0.15, 0.13], 0.025);
@@ -241,6 +252,7 @@ pub fn floor_lamp(b: &mut Builder) {
 
 /// A lamp for a table top at `at`.
 pub fn table_lamp(b: &mut Builder, at: [f32; 3], body: [u8; 3]) {
+    b.begin();
     let [x, y, z] = at;
     let ceramic = b.paint(Pattern::Zigzag, body, [235, 230, 220], 26.0);
     let shade = b.glowing([248, 232, 200], 0.9);
@@ -252,6 +264,7 @@ pub fn table_lamp(b: &mut Builder, at: [f32; 3], body: [u8; 3]) {
 
 /// A lamp that hangs from a ceiling at `height`, and the light it gives.
 pub fn pendant(b: &mut Builder, height: f32, drop: f32, power: Vec3) {
+    b.begin();
     let metal = b.paint(Pattern::Plain, BLACK, BLACK, 3.0);
     let shade = b.paint(Pattern::Stripes, [235, 190, 120], [200, 120, 60], 28.0);
     b.set_glow(shade, 0.8);
@@ -264,6 +277,7 @@ pub fn pendant(b: &mut Builder, height: f32, drop: f32, power: Vec3) {
 
 /// A vase.
 pub fn vase(b: &mut Builder, at: [f32; 3], k: f32, color: [u8; 3]) {
+    b.begin();
     let [x, y, z] = at;
     let glaze = b.paint(Pattern::Zigzag, color, [225, 215, 190], 20.0 / k);
     b.cone(Kind::vase, glaze, [x, y, z], [0.05 * k, 0.10 * k], 0.12 * k);
@@ -273,6 +287,7 @@ pub fn vase(b: &mut Builder, at: [f32; 3], k: f32, color: [u8; 3]) {
 
 /// Flowers or twigs from a point upwards.
 pub fn bouquet(b: &mut Builder, at: [f32; 3], reach: f32, count: usize, bloom: [u8; 3]) {
+    b.begin();
     let stem = b.paint(Pattern::Leaf, [50, 95, 40], [90, 130, 60], 1.0);
     let petal = b.paint(Pattern::Leaf, bloom, [250, 235, 210], 1.0);
     for i in 0..count {
@@ -287,6 +302,7 @@ pub fn bouquet(b: &mut Builder, at: [f32; 3], reach: f32, count: usize, bloom: [
 
 /// A potted plant with broad leaves.
 pub fn plant(b: &mut Builder, at: [f32; 3], k: f32, leaves: usize) {
+    b.begin();
     let [x, y, z] = at;
     let clay = b.paint(Pattern::Zigzag, [170, 90, 60], [190, 120, 85], 14.0 / k);
     let soil = b.paint(Pattern::Stucco, [60, 45, 35], [60, 45, 35], 1.0);
@@ -320,6 +336,7 @@ pub fn plant(b: &mut Builder, at: [f32; 3], k: f32, leaves: usize) {
 
 /// A cup with a handle.
 pub fn cup(b: &mut Builder, at: [f32; 3], color: [u8; 3]) {
+    b.begin();
     let [x, y, z] = at;
     let glaze = b.paint(Pattern::Stripes, color, [240, 235, 225], 45.0);
     let coffee = b.paint(Pattern::Plain, [70, 42, 25], [70, 42, 25], 9.0);
@@ -341,6 +358,7 @@ pub fn cup(b: &mut Builder, at: [f32; 3], color: [u8; 3]) {
 
 /// A framed painting on a wall at y = 0, centred at (x, z).
 pub fn picture(b: &mut Builder, centre: [f32; 2], size: [f32; 2]) {
+    b.begin();
     let [x, z] = centre;
     let [w, h] = [0.5 * size[0], 0.5 * size[1]];
     let dark = b.rng.pick(&[[40, 32, 28], [120, 84, 48], [196, 168, 110], [225, 222, 214]]);
@@ -366,6 +384,7 @@ pub fn picture(b: &mut Builder, centre: [f32; 2], size: [f32; 2]) {
 
 /// A screen on a stand, on a top at `at`, `width` wide.
 pub fn monitor(b: &mut Builder, at: [f32; 3], width: f32, degrees: f32) {
+    b.begin();
     let black = b.paint(Pattern::Plain, BLACK, BLACK, 3.0);
     let screen = b.paint(Pattern::Screen, BLACK, BLACK, 1.0);
     b.set_glow(screen, 0.45);
@@ -387,6 +406,7 @@ pub fn monitor(b: &mut Builder, at: [f32; 3], width: f32, degrees: f32) {
 
 /// A window in a wall at y = 0 with a sill, and the daylight it lets in.
 pub fn window(b: &mut Builder, centre: [f32; 2], size: [f32; 2], power: Vec3) {
+    b.begin();
     let [x, z] = centre;
     let [w, h] = [0.5 * size[0], 0.5 * size[1]];
     let white = b.paint(Pattern::Wood, [222, 220, 212], [205, 202, 192], 2.0);
@@ -433,6 +453,7 @@ pub fn window(b: &mut Builder, centre: [f32; 2], size: [f32; 2], power: Vec3) {
 
 /// A curtain as a row of folds in front of a wall at y = 0.
 pub fn curtain(b: &mut Builder, range: [f32; 2], z: [f32; 2], cloth: u16) {
+    b.begin();
     let folds = ((range[1] - range[0]) / 0.075) as usize;
     let step = (range[1] - range[0]) / folds as f32;
     for i in 0..folds {
@@ -445,6 +466,7 @@ pub fn curtain(b: &mut Builder, range: [f32; 2], z: [f32; 2], cloth: u16) {
 
 /// A door in a wall at y = 0, centred at x.
 pub fn door(b: &mut Builder, x: f32, leaf: u16, frame: u16) {
+    b.begin();
     let w = 0.43;
     b.block(Kind::door, leaf, [x - w, -0.03, 0.006], [x + w, -0.001, 2.02]);
     for s in [-1.0f32, 1.0] {
@@ -460,5 +482,6 @@ pub fn door(b: &mut Builder, x: f32, leaf: u16, frame: u16) {
 
 /// A skirting board along a wall at y = 0 from `range[0]` to `range[1]`.
 pub fn skirting(b: &mut Builder, range: [f32; 2], paint: u16) {
+    b.begin();
     b.block(Kind::wall, paint, [range[0], -0.016, 0.0], [range[1], -0.0005, 0.085]);
 }

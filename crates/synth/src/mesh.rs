@@ -23,6 +23,11 @@ pub struct SyntheticMesh {
     pub triangles: Vec<[u32; 3]>,
     /// Compact class of each triangle.
     pub face_class: Vec<u8>,
+    /// Number of the thing that each triangle is of: one piece of furniture or one other thing as
+    /// it was built (a chair, a book, a cushion, a picture with its frame). Walls are one, as are the
+    /// floor and the ceiling; boards, beams and columns are things of their own. Numbers have gaps
+    /// where nothing of a thing can be seen. A thing has one class.
+    pub face_object: Vec<u32>,
     /// sRGB colour of each vertex.
     pub colors: Vec<[u8; 3]>,
 }
@@ -134,6 +139,7 @@ pub fn build(scene: &Scene) -> SyntheticMesh {
                         let corners = t.map(|k| use_point(&mut mesh, k));
                         mesh.triangles.push(corners);
                         mesh.face_class.push(solid.class[face as usize]);
+                        mesh.face_object.push(solid.object[face as usize]);
                     }
                 }
             }

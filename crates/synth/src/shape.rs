@@ -33,6 +33,8 @@ pub struct Primitive {
     pub material: [u16; 6],
     /// Compact class of each face.
     pub class: [u8; 6],
+    /// The thing that each face is of.
+    pub object: [u32; 6],
 }
 
 /// Where a surface is, for textures and light maps.
@@ -259,6 +261,7 @@ mod tests {
             half,
             material: [0; 6],
             class: [0; 6],
+            object: [0; 6],
         }
     }
 

@@ -44,3 +44,34 @@ pub fn positive_metres(text: &str) -> Result<f64, String> {
         _ => Err("expected metres from 0.001 to 1".to_owned()),
     }
 }
+
+/// A length from nothing to a metre \[m\]; what is not nothing is at least a millimetre.
+pub fn gap_metres(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(m) if m == 0.0 || (0.001..=1.0).contains(&m) => Ok(m),
+        _ => Err("expected metres, 0 or from 0.001 to 1".to_owned()),
+    }
+}
+
+/// An area of nothing or more \[m2\].
+pub fn square_metres(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(area) if area >= 0.0 && area.is_finite() => Ok(area),
+        _ => Err("expected square metres, 0 or more".to_owned()),
+    }
+}
+
+/// A direction, brought to length 1.
+pub fn direction(text: &str) -> Result<DVec3, String> {
+    let expected = "expected 3 numbers that are not all 0, for example 0,0,1";
+    let numbers: Vec<f64> = text
+        .split(',')
+        .map(|n| n.trim().parse())
+        .collect::<Result<_, _>>()
+        .map_err(|_| format!("found something that is no number, {expected}"))?;
+    let [x, y, z] = numbers[..] else {
+        return Err(format!("found {} numbers, {expected}", numbers.len()));
+    };
+    let unit = DVec3::new(x, y, z).try_normalize();
+    unit.ok_or_else(|| format!("found a vector without a direction, {expected}"))
+}

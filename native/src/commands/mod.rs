@@ -9,6 +9,7 @@ pub mod info;
 pub mod inspect;
 pub mod label;
 pub mod mesh;
+pub mod objects;
 pub mod render;
 pub mod run;
 pub mod serve;

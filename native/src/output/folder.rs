@@ -20,7 +20,7 @@ const RESUME: &str = mte_slam_report::files::RESUME_FOLDER;
 const MARKERS: [&str; 3] = ["metrics.json", "config.toml", RESUME];
 /// What a run writes, and therefore what a new run in the same folder takes away first, so that
 /// no file of the old run stays beside files of the new one. `metrics.json` is renamed last.
-const OURS: [&str; 18] = [
+const OURS: [&str; 20] = [
     "metrics.json",
     "eval.json",
     "trajectory.txt",
@@ -35,6 +35,8 @@ const OURS: [&str; 18] = [
     "legend.png",
     "confusion.png",
     "mesh.glb",
+    "objects.json",
+    "objects.glb",
     "checkpoint.safetensors",
     "metrics.json.tmp",
     "renders",

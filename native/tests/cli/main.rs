@@ -6,6 +6,7 @@ mod ablation;
 mod evaluate;
 mod labels;
 mod layouts;
+mod objects;
 mod outputs;
 mod program;
 mod protocols;

@@ -203,8 +203,8 @@ fn help_and_information_work_without_anything() {
     let folder = tempfile::tempdir().unwrap();
     let f = folder.path();
     for command in [
-        "demo", "run", "eval", "ablate", "mesh", "render", "synth", "inspect", "convert", "info",
-        "bench", "shaders",
+        "demo", "run", "eval", "ablate", "mesh", "objects", "render", "synth", "inspect",
+        "convert", "info", "bench", "shaders",
     ] {
         let help = text(&succeed(f, &[command, "--help"]).stdout);
         assert!(help.contains("Usage:"), "{help}");

@@ -35,6 +35,7 @@ pub fn build(b: &mut Builder) -> (Primitive, Vec<Waypoint>) {
     b.place([0.0; 3], 0.0);
     for at in [-3.3f32, 0.05, 3.4] {
         let (low, high) = (at - 0.12, at + 0.12);
+        b.begin();
         b.block(Kind::ceiling, walnut, [low, -y + 1e-3, h - 0.3], [high, y - 1e-3, h - 1e-3]);
     }
     for (at, drop) in [([-1.6, 0.4, 0.0], 3.2), ([2.2, -0.5, 0.0], 2.6)] {
@@ -44,11 +45,14 @@ pub fn build(b: &mut Builder) -> (Primitive, Vec<Waypoint>) {
 
     // West: a gallery on columns, with a railing, bookcases and a sofa on it and beneath.
     b.place([0.0; 3], 0.0);
+    b.begin();
     b.block(Kind::floor, oak, [-x + 1e-3, -y + 1e-3, 3.4], [-x + 2.2, y - 1e-3, 3.6]);
     let marble = b.paint(Pattern::Stucco, [222, 216, 206], [190, 180, 170], 2.0);
     for along in [-3.0f32, -1.0, 1.0, 3.0] {
+        b.begin();
         b.cone(Kind::wall, marble, [-x + 2.0, along, 0.0], [0.19, 0.15], 3.3999);
     }
+    b.begin();
     b.block(Kind::wall, walnut, [-x + 2.1, -y + 1e-3, 4.5], [-x + 2.16, y - 1e-3, 4.58]);
     for i in 0..30 {
         let along = -4.35 + 0.3 * i as f32;
@@ -101,6 +105,7 @@ pub fn build(b: &mut Builder) -> (Primitive, Vec<Waypoint>) {
     let rug = b.paint(Pattern::Rug, [132, 38, 38], [40, 62, 98], 0.7);
     for side in [-1.0f32, 1.0] {
         b.place([1.0, 1.7 * side, 0.0], 0.0);
+        b.begin();
         b.block(Kind::rug, rug, [-2.0, -1.2, 0.0], [2.0, 1.2, 0.012]);
         b.place([1.0, 1.7 * side, 0.012], 3.0 * side);
         table(b, walnut, oak, [2.8, 0.95, 0.74]);

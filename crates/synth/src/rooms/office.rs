@@ -22,6 +22,7 @@ fn workplace(b: &mut Builder, top: u16, metal: u16, screens: usize) {
         _ => monitor(b, [0.0, 0.16, 0.735], 0.62, 5.0),
     }
     let keys = b.paint(Pattern::Keys, [42, 42, 46], [200, 200, 200], 1.0);
+    b.begin();
     b.block(Kind::monitor, keys, [-0.23, -0.24, 0.7351], [0.21, -0.10, 0.752]);
     let color = b.rng.pick(&[[180, 60, 50], [50, 100, 160], [80, 140, 80]]);
     cup(b, [0.52, -0.14, 0.735], color);
@@ -76,6 +77,7 @@ pub fn build(b: &mut Builder) -> (Primitive, Vec<Waypoint>) {
     b.place([-x, 0.0, 0.0], 90.0);
     skirting(b, [-y + 0.017, y - 0.017], grey);
     let board = b.paint(Pattern::Whiteboard, [188, 150, 104], [120, 90, 60], 1.0);
+    b.begin();
     b.block(Kind::picture, board, [-0.75, -0.025, 1.15], [0.75, -0.001, 2.1]);
     b.place([-x + 0.23, 0.1, 0.0], 90.0);
     let front = b.paint(Pattern::Panels, [150, 152, 150], [172, 174, 172], 2.0);
@@ -99,6 +101,7 @@ pub fn build(b: &mut Builder) -> (Primitive, Vec<Waypoint>) {
     b.place([0.0, -y, 0.0], 180.0);
     skirting(b, [-x + 0.017, x - 0.017], grey);
     let board = b.paint(Pattern::Whiteboard, [226, 228, 230], [130, 132, 136], 1.0);
+    b.begin();
     b.block(Kind::picture, board, [-1.3, -0.025, 0.98], [0.5, -0.001, 1.98]);
     picture(b, [1.55, 1.55], [0.66, 0.50]);
     b.place([1.30, -y + 0.46, 0.0], 180.0);
@@ -120,10 +123,12 @@ pub fn build(b: &mut Builder) -> (Primitive, Vec<Waypoint>) {
     // Middle: a meeting table on a rug.
     b.place([0.0; 3], 0.0);
     let rug = b.paint(Pattern::Rug, [52, 70, 104], [150, 110, 50], 1.0);
+    b.begin();
     b.block(Kind::rug, rug, [-1.25, -1.15, 0.0], [1.35, 0.62, 0.012]);
     b.place([0.05, -0.25, 0.012], -8.0);
     table(b, white, black, [1.30, 0.80, 0.72]);
     let laptop = b.paint(Pattern::Keys, [120, 122, 126], [40, 40, 44], 1.0);
+    b.begin();
     b.block(Kind::monitor, laptop, [-0.42, -0.18, 0.7201], [-0.10, 0.04, 0.736]);
     let screen = b.paint(Pattern::Screen, BLACK, BLACK, 1.0);
     b.set_glow(screen, 0.45);

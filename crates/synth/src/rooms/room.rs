@@ -33,6 +33,7 @@ pub fn build(b: &mut Builder) -> (Primitive, Vec<Waypoint>) {
 
     b.place([0.0; 3], 0.0);
     for i in [-1.45f32, 0.05, 1.55] {
+        b.begin();
         b.block(
             Kind::ceiling,
             walnut,
@@ -72,6 +73,7 @@ pub fn build(b: &mut Builder) -> (Primitive, Vec<Waypoint>) {
     curtain(b, [-1.66, -1.30], [0.62, 2.28], drape);
     curtain(b, [0.06, 0.42], [0.62, 2.28], drape);
     let rod = b.paint(Pattern::Plain, [120, 90, 50], [120, 90, 50], 4.0);
+    b.begin();
     b.leaning_cone(
         Kind::curtain,
         rod,
@@ -92,6 +94,7 @@ pub fn build(b: &mut Builder) -> (Primitive, Vec<Waypoint>) {
     table(b, oak, walnut, [1.35, 0.64, 0.74]);
     monitor(b, [0.05, 0.10, 0.74], 0.58, 4.0);
     let keys = b.paint(Pattern::Keys, [40, 40, 44], [190, 190, 190], 1.0);
+    b.begin();
     b.block(Kind::monitor, keys, [-0.20, -0.22, 0.7401], [0.24, -0.08, 0.758]);
     cup(b, [0.44, -0.12, 0.74], [50, 110, 170]);
     table_lamp(b, [-0.52, 0.14, 0.74], [60, 120, 110]);
@@ -130,6 +133,7 @@ pub fn build(b: &mut Builder) -> (Primitive, Vec<Waypoint>) {
     // Middle: rug, table with things, chairs.
     b.place([0.0; 3], 0.0);
     let rug = b.paint(Pattern::Rug, [132, 38, 38], [40, 62, 98], 1.0);
+    b.begin();
     b.block(Kind::rug, rug, [-1.35, -0.98, 0.0], [1.45, 0.98, 0.012]);
     b.place([0.05, 0.0, 0.012], 6.0);
     table(b, walnut, walnut, [1.25, 0.80, 0.72]);
