@@ -134,3 +134,18 @@ fn cabinet() {
     assert!((s.time_s(0) - 1341841278.8427).abs() < 1e-6);
     assert!((s.truth(0).unwrap().translation.x + 2.5508).abs() < 1e-9);
 }
+
+/// Opens one of the small recordings that show a kind of mistake.
+fn faulty(name: &str) -> Option<Box<dyn Sequence>> {
+    opened(&format!("faults/{name}"), 1.0)
+}
+
+#[test]
+fn hidden_and_shouted_names() {
+    for name in ["mac-images", "upper-images"] {
+        let Some(mut s) = faulty(name) else { return };
+        assert_eq!((s.info().layout, s.info().frames), ("images", 12), "{name}");
+        check_ends(s.as_mut(), false);
+        assert_eq!(s.warnings(), Vec::<String>::new(), "{name}");
+    }
+}

@@ -1,4 +1,5 @@
 //! The files of a recording by name and by number, and the plain text among them.
+use super::names::Names;
 use mte_slam_types::{
     pose::Pose,
     sequence::{SequenceError, Source},
@@ -31,38 +32,48 @@ pub(super) const COLOR_ENDS: [&str; 3] = [".jpg", ".png", ".jpeg"];
 /// Files beside scenes that belong to all of them.
 const SHARED: [&str; 2] = ["cam_params.json", "scannetv2-labels.combined.tsv"];
 
-/// A source with its list of names, seen from the folder in which the recording lies.
+/// A source with its list of names, seen from the folder in which the recording lies. Names are
+/// compared without case: those that it lists are in lower case, and others find theirs, too.
 pub(super) struct Folder {
     source: Box<dyn Source>,
-    /// Empty, or the folder of the recording inside the source, with a final `/`.
+    /// Empty, or the folder of the recording inside the source, with a final `/`, as the source
+    /// writes it.
     prefix: String,
-    all: BTreeSet<String>,
-    /// Names below `prefix`, without it.
+    all: Names,
+    /// Names below `prefix`, without it, in lower case.
     names: BTreeSet<String>,
 }
 
 impl Folder {
     /// Lists the source once.
     pub fn new(source: Box<dyn Source>) -> Result<Self, SequenceError> {
-        let all: BTreeSet<String> = source.list()?.into_iter().collect();
-        let names = all.iter().filter(|n| !n.starts_with("../")).cloned().collect();
+        let all = Names::new(source.list()?);
+        let names = all.folded().filter(|n| !n.starts_with("../")).map(String::from).collect();
         Ok(Self { source, prefix: String::new(), all, names })
+    }
+
+    /// Returns what people should know of the files, one sentence each.
+    pub fn notes(&self) -> Vec<String> {
+        self.all.note().into_iter().collect()
     }
 
     /// When every file lies in one sub-folder (an unpacked archive often looks so), but for those
     /// that scenes share, go there. Returns whether it did.
     pub fn descend(&mut self) -> bool {
         let own = || self.names.iter().filter(|n| !SHARED.contains(&n.as_str()));
-        let Some((top, _)) = own().next().and_then(|n| n.split_once('/')) else {
+        let Some((first, (top, _))) = own().next().and_then(|n| Some((n, n.split_once('/')?)))
+        else {
             return false;
         };
         let top = format!("{top}/");
         if !own().all(|n| n.starts_with(&top)) {
             return false;
         }
+        let longer = self.prefix.len() + top.len();
+        let shown = self.all.find(&format!("{}{first}", self.prefix)).map(|n| n[..longer].into());
+        self.prefix = shown.unwrap_or_else(|| format!("{}{top}", self.prefix));
         self.names =
             self.names.iter().filter_map(|n| n.strip_prefix(&top)).map(String::from).collect();
-        self.prefix += &top;
         true
     }
 
@@ -74,14 +85,22 @@ impl Folder {
         }
     }
 
-    /// Returns the names of the files, sorted, relative to the recording's folder.
+    /// Returns the names of the files, sorted, in lower case, relative to the recording's folder.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.names.iter().map(String::as_str)
     }
 
-    /// Returns whether there is such a file.
+    /// Returns whether there is such a file, in any case.
     pub fn has(&self, name: &str) -> bool {
-        self.names.contains(name)
+        self.real(name).is_some()
+    }
+
+    /// Returns a file's name as it is really written, relative to the recording's folder.
+    pub fn real(&self, name: &str) -> Option<&str> {
+        // What lies above is found by `here_or_above` alone, whatever a list may ask for.
+        let inside = name.split('/').all(|part| !matches!(part, "" | "." | ".."));
+        let found = self.all.find(&format!("{}{name}", self.prefix)).filter(|_| inside)?;
+        found.get(self.prefix.len()..)
     }
 
     /// `name` here, or one or two folders up where the source lets us see it.
@@ -98,7 +117,7 @@ impl Folder {
             }
             let folder: String = inside.iter().map(|part| format!("{part}/")).collect();
             let above = format!("{outside}{folder}{name}");
-            if self.all.contains(&above) {
+            if let Some(above) = self.all.find(&above) {
                 // The '/' in front marks a name relative to the source, not to the recording.
                 return Some(format!("/{above}"));
             }
@@ -108,10 +127,10 @@ impl Folder {
 
     /// Returns the name that the source knows a file by.
     fn in_source(&self, name: &str) -> Result<String, SequenceError> {
-        match name.strip_prefix('/') {
-            Some(of_source) => Ok(of_source.into()),
-            None if self.has(name) => Ok(format!("{}{name}", self.prefix)),
-            None => Err(SequenceError::Read {
+        match (name.strip_prefix('/'), self.real(name)) {
+            (Some(of_source), _) => Ok(of_source.into()),
+            (None, Some(real)) => Ok(format!("{}{real}", self.prefix)),
+            (None, None) => Err(SequenceError::Read {
                 file: name.into(),
                 reason: format!("no such file in {}", self.name()),
             }),

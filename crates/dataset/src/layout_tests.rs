@@ -256,3 +256,77 @@ fn images_of_too_many_pixels_are_refused() {
     let e = error_of(&m, OpenOptions::default());
     assert_has(&e, &["depth000000.png", "16000x16000", &MAX_PIXELS.to_string()]);
 }
+
+/// The same files under other names.
+fn under_names(m: &MemorySource, name: impl Fn(&str) -> String) -> MemorySource {
+    let mut out = MemorySource::new(m.name());
+    m.names().for_each(|n| out.insert(name(n), m.get(n).unwrap()));
+    out
+}
+
+#[test]
+fn hidden_files_are_no_part_of_any_layout() {
+    for layout in Layout::ALL {
+        let plain = renamed(12, layout);
+        // What macOS puts into archives, beside the files and in a folder at the top.
+        let mut mac = under_names(&plain, |n| format!("scan/{n}"));
+        for name in plain.names() {
+            let (folder, base) = name.rsplit_once('/').map_or(("", name), |(f, b)| (f, b));
+            mac.insert(format!("scan/{folder}/._{base}").replace("//", "/"), "Mac OS X");
+            mac.insert(format!("__MACOSX/scan/{name}"), "Mac OS X");
+            mac.insert(format!("scan/{folder}/.DS_Store").replace("//", "/"), "Mac OS X");
+        }
+        let (mut a, mut b) = (opened(&plain).unwrap(), opened(&mac).unwrap());
+        assert_eq!(a.warnings(), b.warnings(), "{layout}");
+        for i in 0..12 {
+            let (want, got) = (a.frame(i).unwrap(), b.frame(i).unwrap());
+            assert_eq!((want.color, want.depth), (got.color, got.depth), "{layout} {i}");
+            assert_eq!((want.labels, want.truth), (got.labels, got.truth), "{layout} {i}");
+        }
+    }
+    // Folders of labels and of feature maps, too.
+    let mut labels = MemorySource::new("labels");
+    (0..3).for_each(|i| labels.insert(format!("._{i}.png"), "Mac OS X"));
+    let labels = LabelSource::Folder(Box::new(labels));
+    let e = error_of(&replica(3), OpenOptions { labels, ..Default::default() });
+    assert_has(&e, &["label images", "0 files"]);
+}
+
+#[test]
+fn names_are_read_in_any_case() {
+    let shout = |n: &str| format!("Scan/{}", n.to_ascii_uppercase());
+    for layout in Layout::ALL {
+        let plain = renamed(12, layout);
+        let (mut a, mut b) =
+            (opened(&plain).unwrap(), opened(&under_names(&plain, shout)).unwrap());
+        assert_eq!((a.warnings(), b.info().name.as_str()), (b.warnings(), "Scan"), "{layout}");
+        for i in 0..12 {
+            let (want, got) = (a.frame(i).unwrap(), b.frame(i).unwrap());
+            assert_eq!((want.color, want.depth), (got.color, got.depth), "{layout} {i}");
+            assert_eq!((want.labels, want.truth), (got.labels, got.truth), "{layout} {i}");
+        }
+    }
+    // Errors show the names as they are.
+    let mut m = under_names(&replica(3), shout);
+    m.insert("Scan/RESULTS/DEPTH000001.PNG", "hello");
+    assert_has(&error_of(&m, OpenOptions::default()), &["RESULTS/DEPTH000001.PNG (frame 1)"]);
+}
+
+#[test]
+fn names_that_differ_in_case_alone_are_kept_apart_or_said() {
+    let mut m = renamed(2, Layout::Tum);
+    // A list can name either.
+    m.insert("rgb/A.png", png_of(W, H, 0x5050));
+    m.insert("rgb/a.png", png_of(W, H, 0x9090));
+    m.insert("rgb.txt", "100.0 rgb/A.png\n100.0333 rgb/a.png\n");
+    let mut s = opened(&m).unwrap();
+    let shade = |s: &mut dyn mte_slam_types::sequence::Sequence, i| s.frame(i).unwrap().color[0][0];
+    assert_eq!([shade(s.as_mut(), 0), shade(s.as_mut(), 1)], [0x50, 0x90]);
+    assert_has(&s.warnings().join(";"), &["rgb/A.png (beside rgb/a.png)"]);
+    // Where names are searched for, the lower case counts.
+    let mut m = renamed(2, Layout::Images);
+    m.insert("rgb/VIEW1.png", png_of(W, H, 0x5050));
+    let mut s = opened(&m).unwrap();
+    assert_eq!(s.frame(1).unwrap().color, frame(1).color);
+    assert_has(&s.warnings().join(";"), &["1 file differs", "rgb/VIEW1.png"]);
+}

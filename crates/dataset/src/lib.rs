@@ -22,6 +22,9 @@
 //!
 //! Archives of any of them are read in place ([`ZipSource`]).
 //!
+//! Names are compared without case (`.JPG`, `Color/`), and hidden files (`.DS_Store`, the `._` files
+//! and `__MACOSX/` of macOS) do not count.
+//!
 //! Frames are in numeric order, and the world frame is the data set's own.
 extern crate alloc;
 
@@ -37,6 +40,7 @@ mod intrinsics;
 mod labels;
 mod layouts;
 mod memory;
+mod names;
 mod reader;
 mod resize;
 mod scannet_ids;

@@ -178,7 +178,8 @@ pub fn open(
     };
     let layout = Layout::detect(&mut folder, options.layout, given.is_some())?;
     let mut all = layout.read(&folder, given)?;
-    let mut warnings = std::mem::take(&mut all.warnings);
+    let mut warnings = folder.notes();
+    warnings.append(&mut all.warnings);
     if let Some(units) = options.depth_scale {
         all.depth_unit_m = 1.0 / units;
     }
@@ -188,6 +189,12 @@ pub fn open(
         }
     }
 
+    // Messages show names as they are really written.
+    for stored in all.frames.iter_mut().flat_map(|f| [&mut f.color, &mut f.depth]) {
+        if let Some(real) = folder.real(&stored.file) {
+            stored.file = real.into();
+        }
+    }
     let there = all.frames.len();
     let wanted = options.frames.unwrap_or(usize::MAX);
     let mut frames: Vec<Entry> =

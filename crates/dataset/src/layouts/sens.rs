@@ -47,7 +47,8 @@ impl LayoutFiles for Sens {
 
 /// Returns the `.sens` files of a folder.
 fn files_of(folder: &Folder) -> Vec<&str> {
-    folder.names().filter(|n| n.ends_with(".sens") && !n.contains('/')).collect()
+    let packed = folder.names().filter(|n| n.ends_with(".sens") && !n.contains('/'));
+    packed.filter_map(|n| folder.real(n)).collect()
 }
 
 /// Reads a file piece by piece.
