@@ -149,3 +149,15 @@ fn hidden_and_shouted_names() {
         assert_eq!(s.warnings(), Vec::<String>::new(), "{name}");
     }
 }
+
+#[test]
+fn an_archive_with_backslashes() {
+    let Some(folder) = data("faults/mac-images") else { return };
+    let archive = folder.0.parent().unwrap().join("backslash.zip");
+    let file = std::fs::File::open(&archive).unwrap();
+    let source = ZipSource::new("backslash.zip", file, 1 << 26).unwrap();
+    let mut s = open(Box::new(source), OpenOptions::default()).unwrap();
+    assert_eq!((s.info().layout, s.info().frames), ("images", 12));
+    check_ends(s.as_mut(), false);
+    assert_eq!(s.warnings(), Vec::<String>::new());
+}

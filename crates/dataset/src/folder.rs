@@ -54,7 +54,7 @@ impl Folder {
 
     /// Returns what people should know of the files, one sentence each.
     pub fn notes(&self) -> Vec<String> {
-        self.all.note().into_iter().collect()
+        self.source.notes().into_iter().chain(self.all.note()).collect()
     }
 
     /// When every file lies in one sub-folder (an unpacked archive often looks so), but for those

@@ -330,3 +330,27 @@ fn names_that_differ_in_case_alone_are_kept_apart_or_said() {
     assert_eq!(s.frame(1).unwrap().color, frame(1).color);
     assert_has(&s.warnings().join(";"), &["1 file differs", "rgb/VIEW1.png"]);
 }
+
+#[test]
+fn what_a_source_leaves_out_is_said() {
+    struct Partial(MemorySource);
+    impl Source for Partial {
+        fn name(&self) -> &str {
+            self.0.name()
+        }
+        fn list(&self) -> Result<Vec<String>, SequenceError> {
+            self.0.list()
+        }
+        fn notes(&self) -> Vec<String> {
+            vec!["3 files left out".into()]
+        }
+        fn read(&self, file: &str) -> Result<Vec<u8>, SequenceError> {
+            self.0.read(file)
+        }
+    }
+    let s = open(Box::new(Partial(replica(1))), OpenOptions::default()).unwrap();
+    assert_eq!(s.warnings(), ["3 files left out"]);
+    let nothing = Partial(MemorySource::new("none"));
+    let e = open(Box::new(nothing), OpenOptions::default()).err().unwrap().to_string();
+    assert_has(&e, &["the folder is empty", "3 files left out"]);
+}

@@ -136,6 +136,7 @@ impl Layout {
                     0 => "the folder is empty".into(),
                     _ => format!("of {files} files: {}", reports.join("; ")),
                 };
+                folder.notes().iter().for_each(|note| reason += &format!(" ({note})"));
             }
             if !folder.descend() {
                 return Err(SequenceError::UnknownLayout { folder: name, reason });
