@@ -161,3 +161,12 @@ fn an_archive_with_backslashes() {
     check_ends(s.as_mut(), false);
     assert_eq!(s.warnings(), Vec::<String>::new());
 }
+
+#[test]
+fn cameras_that_differ_by_little() {
+    let Some(mut s) = faulty("polycam-perframe") else { return };
+    assert_eq!((s.info().layout, s.info().frames), ("nerfstudio", 12));
+    check_ends(s.as_mut(), false);
+    let said = s.warnings().join(";");
+    assert!(said.contains("pixels: the median is taken for all"), "{said}");
+}

@@ -1,6 +1,7 @@
 //! What each layout boils down to: a list of frames with file names, and a camera.
 use super::{
     folder::{Folder, invalid, parse_matrix, plural},
+    frame_camera::Fit,
     intrinsics::Intrinsics,
     stored::Stored,
 };
@@ -17,13 +18,30 @@ pub(super) struct Entry {
     pub depth: Stored,
     pub label: Option<String>,
     pub truth: Option<Pose>,
+    /// fx, fy, cx, cy of this frame where the frames' cameras differ \[pixels of the recording's
+    /// camera\].
+    pub focal_centre: Option<[f64; 4]>,
+    /// How images of this frame become those of the recording's camera, where they must.
+    pub fit: Option<Fit>,
 }
 
 impl Entry {
     /// A frame whose images are files of their own, and that has no time stamp.
     pub fn of_files(number: u64, color: String, depth: String, truth: Option<Pose>) -> Entry {
         let (color, depth) = (color.into(), depth.into());
-        Entry { number, time_s: number as f64, color, depth, label: None, truth }
+        Entry::stamped(number, number as f64, color, depth, truth)
+    }
+
+    /// A frame with a time stamp \[s\].
+    pub fn stamped(
+        number: u64,
+        time_s: f64,
+        color: Stored,
+        depth: Stored,
+        truth: Option<Pose>,
+    ) -> Entry {
+        let (label, focal_centre, fit) = (None, None, None);
+        Entry { number, time_s, color, depth, label, truth, focal_centre, fit }
     }
 }
 
@@ -62,6 +80,7 @@ impl Entries {
         if let Some(given) = given {
             let depth_scale = self.intrinsics.depth_scale;
             self.intrinsics = Intrinsics { depth_scale, ..given };
+            self.frames.iter_mut().for_each(|frame| frame.focal_centre = None);
         }
         if let Some(scale) = self.intrinsics.depth_scale {
             self.depth_unit_m = 1.0 / scale;

@@ -354,3 +354,72 @@ fn what_a_source_leaves_out_is_said() {
     let e = open(Box::new(nothing), OpenOptions::default()).err().unwrap().to_string();
     assert_has(&e, &["the folder is empty", "3 files left out"]);
 }
+
+/// Moves the camera of `transforms.json` into its frames, changed for each by its number.
+fn cameras_per_frame(m: &mut MemorySource, change: impl Fn(u64, &mut serde_json::Value)) {
+    let mut json: serde_json::Value = serde_json::from_slice(m.get(TRANSFORMS).unwrap()).unwrap();
+    for key in ["fl_x", "fl_y", "cx", "cy", "w", "h"] {
+        let value = json.as_object_mut().unwrap().remove(key).unwrap();
+        for frame in json["frames"].as_array_mut().unwrap() {
+            frame[key] = value.clone();
+        }
+    }
+    for frame in json["frames"].as_array_mut().unwrap() {
+        let name = frame["file_path"].as_str().unwrap();
+        let number = name.trim_matches(|c: char| !c.is_ascii_digit()).parse().unwrap();
+        change(number, frame);
+    }
+    m.insert(TRANSFORMS, json.to_string());
+}
+
+#[test]
+fn frames_may_have_cameras_of_their_own() {
+    // By less than half a pixel nothing changes but the camera, which is the median.
+    let mut m = renamed(3, Layout::Nerfstudio);
+    cameras_per_frame(&mut m, |i, f| f["cx"] = (12.0 + 0.1 * i as f64).into());
+    let mut s = opened(&m).unwrap();
+    assert!((s.info().camera.cx - 11.6).abs() < 1e-9);
+    assert_has(&s.warnings().join(";"), &["differ from their median by up to 0.10 pixels"]);
+    for i in 0..3 {
+        let (got, want) = (s.frame(i).unwrap(), frame(i));
+        assert_eq!((got.color, got.depth, got.labels), (want.color, want.depth, want.labels));
+    }
+    // The last frame's camera looks three pixels further left.
+    let mut m = renamed(3, Layout::Nerfstudio);
+    cameras_per_frame(&mut m, |i, f| f["cx"] = if i == 2 { 15.0 } else { 12.0 }.into());
+    let mut s = opened(&m).unwrap();
+    assert_eq!(s.info().camera, info().camera);
+    assert_has(&s.warnings().join(";"), &["up to 3.00 pixels: 1 frame brought into"]);
+    assert_eq!(s.frame(1).unwrap().depth, frame(1).depth);
+    let (got, want, w) = (s.frame(2).unwrap(), frame(2), W as usize);
+    for (i, (x, y)) in (0..want.depth.len()).map(|i| (i, (i % w, i / w))) {
+        let labels = (got.labels.as_ref().unwrap()[i], want.labels.as_ref().unwrap());
+        if x + 3 < w {
+            let at = y * w + x + 3;
+            assert_eq!((got.depth[i], got.color[i]), (want.depth[at], want.color[at]), "{x} {y}");
+            assert_eq!(labels.0, labels.1[at]);
+        } else {
+            assert_eq!((got.depth[i], labels.0), (0, UNLABELLED), "{x} {y}");
+        }
+    }
+    // A camera that is given is that of all frames.
+    let camera = GivenCamera::from_numbers(&[30.0, 31.0, 11.0, 7.0]);
+    let mut s = open(Box::new(m), OpenOptions { camera, ..Default::default() }).unwrap();
+    assert_eq!((s.info().camera.cx, s.frame(2).unwrap().depth), (11.0, frame(2).depth));
+    assert!(!s.warnings().join(";").contains("median"));
+    // Size and distortion belong to all.
+    for (key, value, parts) in [
+        ("w", 25.0, &["(frame 1)", "w and h", "found 25x16", "24x16"][..]),
+        ("k1", 0.5, &["(frame 1)", "k1 k2 p1 p2 k3", "[0.5, 0.0"]),
+        ("fl_x", -4.0, &["transforms.json", "fx and fy > 0"]),
+    ] {
+        let mut m = renamed(3, Layout::Nerfstudio);
+        // Listed from the last to the first.
+        cameras_per_frame(&mut m, |i, f| {
+            if i == 1 {
+                f[key] = value.into();
+            }
+        });
+        assert_has(&error_of(&m, OpenOptions::default()), parts);
+    }
+}

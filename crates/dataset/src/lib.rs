@@ -33,6 +33,7 @@ mod decode;
 mod entries;
 mod features;
 mod folder;
+mod frame_camera;
 #[cfg(fuzzing)]
 pub mod fuzzing;
 pub mod inspect;

@@ -5,13 +5,14 @@ use super::{
     entries::Entry,
     features::FeatureFiles,
     folder::{Folder, invalid, plural},
+    frame_camera::{self, Fit},
     intrinsics::{Intrinsics, Rectifier, checked},
     labels::{LabelOptions, Labels},
     layouts::Layout,
     resize::{Resize, same_aspect},
 };
 use mte_slam_types::{
-    classes::ClassTable,
+    classes::{ClassTable, UNLABELLED},
     frame::{Frame, SequenceInfo},
     pose::Pose,
     sequence::{Sequence, SequenceError, Source},
@@ -223,6 +224,7 @@ pub fn open(
         warnings.push(format!("colour of {w}x{h} fitted to the {to_w}x{to_h} of depth"));
     }
 
+    frame_camera::fit(&mut frames, &all.intrinsics, &camera, depth_size, &mut warnings)?;
     let color_to_depth = Resize::to_size(color_size, depth_size);
     let rectifier = if all.intrinsics.distortion == [0.0; 5] {
         None
@@ -256,8 +258,9 @@ pub fn open(
             Labels::open(&folder, None, &mut frames, depth_size, classes_wanted)?
         }
         LabelSource::Folder(source) => {
-            let own = Some(Folder::new(source)?);
-            Labels::open(&folder, own, &mut frames, depth_size, classes_wanted)?
+            let own = Folder::new(source)?;
+            warnings.extend(own.notes());
+            Labels::open(&folder, Some(own), &mut frames, depth_size, classes_wanted)?
         }
     };
     let bare = frames.iter().filter(|f| f.label.is_none()).count();
@@ -266,11 +269,18 @@ pub fn open(
     }
 
     let features = match options.features {
-        Some(source) => Some(FeatureFiles::open(Folder::new(source)?, &frames)?),
+        Some(source) => {
+            let own = Folder::new(source)?;
+            warnings.extend(own.notes());
+            Some(FeatureFiles::open(own, &frames)?)
+        }
         None => None,
     };
     if features.is_some() && rectifier.is_some() {
         warnings.push("feature maps are taken as they are, with lens distortion".into());
+    }
+    if features.is_some() && frames.iter().any(|f| f.fit.is_some()) {
+        warnings.push("feature maps are taken as they are, each of its frame's own camera".into());
     }
 
     let name = folder.name();
@@ -333,16 +343,22 @@ struct Reader {
 
 impl Reader {
     /// Returns depth or labels, from the size on disk to the size of the camera.
-    fn fit_nearest<T: Copy>(&self, mut image: Vec<T>) -> Vec<T> {
+    fn fit_nearest<T: Copy>(&self, mut image: Vec<T>, fit: Option<Fit>, hole: T) -> Vec<T> {
+        if let Some(fit) = fit {
+            image = fit.nearest(&image, self.depth_size, hole);
+        }
         if let Some(rectifier) = &self.rectifier {
             image = rectifier.nearest(&image);
         }
         if self.resize.is_identity() { image } else { self.resize.nearest(&image) }
     }
 
-    fn fit_color(&self, mut image: Vec<[u8; 3]>) -> Vec<[u8; 3]> {
+    fn fit_color(&self, mut image: Vec<[u8; 3]>, fit: Option<Fit>) -> Vec<[u8; 3]> {
         if !self.color_to_depth.is_identity() {
             image = self.color_to_depth.average(&image);
+        }
+        if let Some(fit) = fit {
+            image = fit.bilinear(&image, self.depth_size);
         }
         if let Some(rectifier) = &self.rectifier {
             image = rectifier.bilinear(&image);
@@ -363,14 +379,15 @@ impl Sequence for Reader {
             .ok_or(SequenceError::OutOfRange { index, frames: self.frames.len() })?
             .clone();
         let frame = entry.number;
-        let color = self.fit_color(entry.color.color(&self.folder, frame, self.color_size)?);
+        let color = entry.color.color(&self.folder, frame, self.color_size)?;
+        let color = self.fit_color(color, entry.fit);
         let mut depth = entry.depth.depth(&self.folder, frame, self.depth_size)?;
         if let Some(marker) = self.invalid_depth {
             for d in depth.iter_mut().filter(|d| **d == marker) {
                 *d = 0;
             }
         }
-        let depth = self.fit_nearest(depth);
+        let depth = self.fit_nearest(depth, entry.fit, 0);
 
         let labels = self.labels(index)?;
         let features = self.features.as_ref().map(|f| f.read(frame)).transpose()?;
@@ -384,8 +401,9 @@ impl Sequence for Reader {
         let (Some(labels), Some(file)) = (&mut self.labels, &entry.label) else {
             return Ok(None);
         };
-        let image = labels.read(&self.folder, file, entry.number, self.depth_size)?;
-        Ok(Some(self.fit_nearest(image)))
+        let (fit, number) = (entry.fit, entry.number);
+        let image = labels.read(&self.folder, file, number, self.depth_size)?;
+        Ok(Some(self.fit_nearest(image, fit, UNLABELLED)))
     }
 
     fn truth(&self, index: usize) -> Option<Pose> {

@@ -5,6 +5,7 @@ use super::interface::{LayoutFiles, Mark, Parts};
 use crate::{
     entries::{Entries, Entry},
     folder::{COLOR_ENDS, Folder, invalid, last_number, plural, shortened},
+    frame_camera,
     intrinsics::{Intrinsics, checked},
 };
 use mte_slam_types::{pose::Pose, sequence::SequenceError};
@@ -18,8 +19,6 @@ const DEPTH_UNIT_M: f64 = 1e-3;
 /// The camera models that are a pinhole with (or without) the distortion that we know.
 const MODELS: [&str; 6] =
     ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE", "SIMPLE_RADIAL", "RADIAL"];
-/// What belongs to a camera, at the top or in every frame.
-const CAMERA_KEYS: [&str; 6] = ["fl_x", "fl_y", "cx", "cy", "w", "h"];
 
 pub(super) struct Nerfstudio;
 
@@ -57,14 +56,7 @@ fn read(folder: &Folder) -> Result<Entries, SequenceError> {
     let first = listed
         .first()
         .ok_or_else(|| invalid(FILE, None, "frames", "an empty list", "at least one frame"))?;
-    let intrinsics = camera(&json, first)?;
-    for (i, frame) in listed.iter().enumerate() {
-        if let Some(key) = CAMERA_KEYS.iter().find(|k| frame.get(**k) != first.get(**k)) {
-            let found = frame.get(*key).map_or("nothing".into(), Value::to_string);
-            let expected = "one camera for all frames, as in the first";
-            return Err(invalid(FILE, Some(i as u64), *key, found, expected));
-        }
-    }
+    let mut intrinsics = camera(&json, first, 0)?;
 
     let mut frames = Vec::with_capacity(listed.len());
     let mut without_depth = 0;
@@ -85,6 +77,7 @@ fn read(folder: &Folder) -> Result<Entries, SequenceError> {
             Some(rows) => pose(number, rows)?,
         };
         let mut entry = Entry::of_files(number, color, depth, truth);
+        entry.focal_centre = Some(same_lens(&intrinsics, camera(&json, frame, number)?, number)?);
         entry.time_s = frame
             .get("timestamp")
             .and_then(Value::as_f64)
@@ -101,6 +94,8 @@ fn read(folder: &Folder) -> Result<Entries, SequenceError> {
         warnings.push(format!("{} without depth left out", plural(without_depth, "frame")));
     }
     in_order(&mut frames, &mut warnings);
+    let cameras: Vec<[f64; 4]> = frames.iter().filter_map(|f| f.focal_centre).collect();
+    intrinsics.focal_centre = frame_camera::median(&cameras).unwrap_or(intrinsics.focal_centre);
 
     let unit = |key: &str| json.get(key).map(|v| (key.to_string(), v.as_f64(), v.to_string()));
     let depth_unit_m = match unit("integer_depth_scale").or(unit("depth_unit_scale_factor")) {
@@ -132,14 +127,37 @@ fn in_order(frames: &mut [Entry], warnings: &mut Vec<String>) {
     }
 }
 
-/// Returns the camera, of the colour images, from the top of the file or else from its first frame.
-fn camera(json: &Value, first: &Value) -> Result<Intrinsics, SequenceError> {
-    let get = |key: &str| json.get(key).or_else(|| first.get(key));
+/// Returns fx, fy, cx and cy of a frame's camera, which may be its own (phones focus), unlike size
+/// and distortion.
+fn same_lens(first: &Intrinsics, own: Intrinsics, frame: u64) -> Result<[f64; 4], SequenceError> {
+    let differs = |field: &str, found: String, expected: String| {
+        let expected = format!("{expected}, as in the first frame");
+        Err(invalid(FILE, Some(frame), field, found, expected))
+    };
+    if own.size != first.size {
+        let shown = |i: &Intrinsics| i.size.map_or(String::new(), |(w, h)| format!("{w}x{h}"));
+        return differs("w and h", shown(&own), shown(first));
+    }
+    if own.distortion != first.distortion {
+        let shown = |i: &Intrinsics| format!("{:?}", i.distortion);
+        return differs("k1 k2 p1 p2 k3", shown(&own), shown(first));
+    }
+    Ok(own.focal_centre)
+}
+
+/// Returns the camera, of the colour images, from the top of the file or else from a frame.
+fn camera(json: &Value, frame: &Value, number: u64) -> Result<Intrinsics, SequenceError> {
+    let get = |key: &str| json.get(key).or_else(|| frame.get(key));
+    let invalid = |file: &str, _: Option<u64>, field: &str, found: String, expected: &str| {
+        // What stands at the top is no frame's.
+        let of_frame = json.get(field).is_none().then_some(number);
+        invalid(file, of_frame, field, found, expected)
+    };
     if let Some(model) = get("camera_model").and_then(Value::as_str)
         && !MODELS.contains(&model)
     {
         let expected = format!("a pinhole: {}", MODELS.join(", "));
-        return Err(invalid(FILE, None, "camera_model", shortened(model), expected));
+        return Err(invalid(FILE, None, "camera_model", shortened(model), &expected));
     }
     let number = |key: &str| -> Result<Option<f64>, SequenceError> {
         match get(key) {
@@ -165,12 +183,13 @@ fn camera(json: &Value, first: &Value) -> Result<Intrinsics, SequenceError> {
         }
     };
     let fx = focal("fl_x", "camera_angle_x", w)?
-        .ok_or_else(|| invalid(FILE, None, "fl_x", "nothing", "fl_x or camera_angle_x"))?;
+        .ok_or_else(|| invalid(FILE, None, "fl_x", "nothing".into(), "fl_x or camera_angle_x"))?;
     let fy = focal("fl_y", "camera_angle_y", h)?.unwrap_or(fx);
     let centre = [number("cx")?.unwrap_or(0.5 * w), number("cy")?.unwrap_or(0.5 * h)];
     for key in ["k4", "k5", "k6"] {
         if number(key)?.is_some_and(|k| k != 0.0) {
-            return Err(invalid(FILE, None, key, "a number", "0: k1 k2 p1 p2 k3 are known here"));
+            let found = "a number".to_string();
+            return Err(invalid(FILE, None, key, found, "0: k1 k2 p1 p2 k3 are known here"));
         }
     }
     let mut distortion = [0.0; 5];

@@ -217,7 +217,7 @@ fn read(folder: &Folder) -> Result<Entries, SequenceError> {
         let depth = part(lengths[1], depth_coding, depth_size, "depth image")?;
         let time_s = time_us as f64 * 1e-6;
         stamped &= frames.last().is_none_or(|last: &Entry| last.time_s < time_s);
-        frames.push(Entry { number, time_s, color, depth, label: None, truth });
+        frames.push(Entry::stamped(number, time_s, color, depth, truth));
     }
     if !stamped {
         warnings.push(format!("{file}: time stamps do not rise: frames are counted instead"));

@@ -64,14 +64,9 @@ fn read(folder: &Folder) -> Result<Entries, SequenceError> {
     let mut frames = Vec::new();
     for (i, (time_s, color)) in colors.iter().enumerate() {
         let Some(depth) = depth_of[i] else { continue };
-        frames.push(Entry {
-            number: frames.len() as u64,
-            time_s: *time_s,
-            color: color.clone().into(),
-            depth: depths[depth].1.clone().into(),
-            label: None,
-            truth: truth_of[i].and_then(|t| truths[t].1),
-        });
+        let truth = truth_of[i].and_then(|t| truths[t].1);
+        let (number, depth) = (frames.len() as u64, depths[depth].1.clone());
+        frames.push(Entry::stamped(number, *time_s, color.clone().into(), depth.into(), truth));
     }
     if frames.is_empty() {
         return Err(invalid(
