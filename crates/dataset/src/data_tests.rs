@@ -170,3 +170,25 @@ fn cameras_that_differ_by_little() {
     let said = s.warnings().join(";");
     assert!(said.contains("pixels: the median is taken for all"), "{said}");
 }
+
+#[test]
+fn stamps_that_are_none_or_of_another_unit() {
+    let Some(s) = faulty("durations") else { return };
+    let said = s.warnings().join("\n");
+    assert!(said.contains("rgb.txt: of 12 time stamps") && said.contains("durations"), "{said}");
+    assert!(said.contains("--order file"), "{said}");
+    let in_order = |name: &str| {
+        let options = OpenOptions { order: FrameOrder::File, ..Default::default() };
+        open(Box::new(data(&format!("faults/{name}")).unwrap()), options).unwrap()
+    };
+    let mut ordered = in_order("durations");
+    check_ends(ordered.as_mut(), false);
+    assert!((ordered.time_s(0) - 1305031453.359684).abs() < 1e-6);
+    assert!((ordered.truth(2).unwrap().translation.x + 0.780561).abs() < 1e-6);
+
+    let Some(s) = faulty("ms-truth") else { return };
+    let said = s.warnings().join("\n");
+    let part = "12 poses, none within 0.02 s of a colour image; they would fit in milliseconds";
+    assert!(said.contains(part), "{said}");
+    check_ends(in_order("ms-truth").as_mut(), false);
+}

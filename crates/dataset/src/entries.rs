@@ -75,11 +75,11 @@ impl Entries {
     pub fn completed(
         mut self,
         folder: &Folder,
-        given: Option<Intrinsics>,
+        given: Option<&Intrinsics>,
     ) -> Result<Entries, SequenceError> {
         if let Some(given) = given {
             let depth_scale = self.intrinsics.depth_scale;
-            self.intrinsics = Intrinsics { depth_scale, ..given };
+            self.intrinsics = Intrinsics { depth_scale, ..given.clone() };
             self.frames.iter_mut().for_each(|frame| frame.focal_centre = None);
         }
         if let Some(scale) = self.intrinsics.depth_scale {

@@ -423,3 +423,16 @@ fn frames_may_have_cameras_of_their_own() {
         assert_has(&error_of(&m, OpenOptions::default()), parts);
     }
 }
+
+#[test]
+fn no_default_camera_is_claimed_beside_a_given_one() {
+    use Layout::{ReplicaNice, ReplicaVmap, ScanNet, SevenScenes, Tum};
+    for layout in [ReplicaNice, ReplicaVmap, ScanNet, SevenScenes, Tum] {
+        let mut m = renamed(2, layout);
+        m.remove("cam_params.json");
+        let camera = GivenCamera::from_numbers(&[30.0, 31.0, 11.0, 7.0]);
+        let s = open(Box::new(m), OpenOptions { camera, ..Default::default() }).unwrap();
+        assert_eq!(s.info().camera.fx, 30.0, "{layout}");
+        assert_eq!(s.warnings(), Vec::<String>::new(), "{layout}");
+    }
+}

@@ -8,7 +8,8 @@ use super::{
     frame_camera::{self, Fit},
     intrinsics::{Intrinsics, Rectifier, checked},
     labels::{LabelOptions, Labels},
-    layouts::Layout,
+    layouts::{Layout, Wanted},
+    order::FrameOrder,
     resize::{Resize, same_aspect},
 };
 use mte_slam_types::{
@@ -100,6 +101,8 @@ pub struct OpenOptions {
     /// How the cameras of the ground-truth poses lie. Layouts with axes of their own (nerfstudio)
     /// are turned before; the default is right for them.
     pub axes: Axes,
+    /// In which order listed frames are taken.
+    pub order: FrameOrder,
     /// First frame, counted from 0 in the recording's order.
     pub start: usize,
     /// One frame in this many is used; at least 1.
@@ -131,6 +134,7 @@ impl Default for OpenOptions {
             camera: None,
             depth_scale: None,
             axes: Axes::default(),
+            order: FrameOrder::default(),
             start: 0,
             stride: 1,
             frames: None,
@@ -178,7 +182,7 @@ pub fn open(
         }
     };
     let layout = Layout::detect(&mut folder, options.layout, given.is_some())?;
-    let mut all = layout.read(&folder, given)?;
+    let mut all = layout.read(&folder, &Wanted { camera: given, order: options.order })?;
     let mut warnings = folder.notes();
     warnings.append(&mut all.warnings);
     if let Some(units) = options.depth_scale {

@@ -1,9 +1,12 @@
 //! A plain folder of colour and depth images whose camera is given.
-use super::interface::{LayoutFiles, Mark, Parts};
+use super::{
+    interface::{LayoutFiles, Mark, Parts},
+    wanted::Wanted,
+};
 use crate::{
     entries::{Entries, Entry, trajectory},
     folder::{COLOR_ENDS, Folder, base, invalid, last_number, numbers, parse_matrix, plural},
-    intrinsics::{self, IMAGES_CAMERA, Intrinsics},
+    intrinsics::IMAGES_CAMERA,
 };
 use mte_slam_types::{pose::Pose, sequence::SequenceError};
 use std::collections::{BTreeMap, BTreeSet};
@@ -39,8 +42,8 @@ impl LayoutFiles for Images {
         ]
     }
 
-    fn read(&self, folder: &Folder, given: Option<&Intrinsics>) -> Result<Entries, SequenceError> {
-        read(folder, given.cloned())
+    fn read(&self, folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
+        read(folder, wanted)
     }
 
     /// Most recordings with a list or poses of their own are such folders, too.
@@ -79,7 +82,7 @@ fn listed<'a>(folder: &'a Folder, folders: &[&str], ends: &[&str]) -> Vec<&'a st
 }
 
 /// Reads everything but the images.
-fn read(folder: &Folder, given: Option<Intrinsics>) -> Result<Entries, SequenceError> {
+fn read(folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
     let mut warnings = Vec::new();
     let pairs = paired(folder, &mut warnings)?;
     let distinct: BTreeSet<u64> = pairs.iter().filter_map(|(c, _)| last_number(c)).collect();
@@ -96,16 +99,10 @@ fn read(folder: &Folder, given: Option<Intrinsics>) -> Result<Entries, SequenceE
     for (frame, truth) in frames.iter_mut().zip(poses(folder, &numbers)?) {
         frame.truth = truth;
     }
-    let intrinsics = match (given, intrinsics::read(folder)?) {
-        (Some(given), read) => {
-            Intrinsics { depth_scale: read.and_then(|r| r.depth_scale), ..given }
-        }
-        (None, Some(read)) => read,
-        (None, None) => {
-            let expected = "intrinsics.json, or the numbers on the command line";
-            return Err(invalid(&folder.name(), None, "camera", "nothing", expected));
-        }
-    };
+    let intrinsics = wanted.camera_or(folder, || {
+        let expected = "intrinsics.json, or the numbers on the command line";
+        Err(invalid(&folder.name(), None, "camera", "nothing", expected))
+    })?;
     Ok(Entries {
         frames,
         intrinsics,

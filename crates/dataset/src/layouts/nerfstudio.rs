@@ -1,12 +1,16 @@
 //! nerfstudio's `transforms.json` with depth, also in the variants of Instant-NGP and NeRFCapture.
 //! Its cameras look along -z with y up (OpenGL), and its pixel (0, 0) has its centre at (1/2, 1/2);
 //! both become ours here.
-use super::interface::{LayoutFiles, Mark, Parts};
+use super::{
+    interface::{LayoutFiles, Mark, Parts},
+    wanted::Wanted,
+};
 use crate::{
     entries::{Entries, Entry},
     folder::{COLOR_ENDS, Folder, invalid, last_number, plural, shortened},
     frame_camera,
     intrinsics::{Intrinsics, checked},
+    order::FrameOrder,
 };
 use mte_slam_types::{pose::Pose, sequence::SequenceError};
 use serde_json::Value;
@@ -41,13 +45,13 @@ impl LayoutFiles for Nerfstudio {
         vec![(FILE, folder.has(FILE).into())]
     }
 
-    fn read(&self, folder: &Folder, _given: Option<&Intrinsics>) -> Result<Entries, SequenceError> {
-        read(folder)
+    fn read(&self, folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
+        read(folder, wanted)
     }
 }
 
 /// Reads everything but the images.
-fn read(folder: &Folder) -> Result<Entries, SequenceError> {
+fn read(folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
     let mut warnings = Vec::new();
     let json = folder.json(FILE)?;
     let listed = json.get("frames").and_then(Value::as_array).ok_or_else(|| {
@@ -93,7 +97,7 @@ fn read(folder: &Folder) -> Result<Entries, SequenceError> {
     if without_depth > 0 {
         warnings.push(format!("{} without depth left out", plural(without_depth, "frame")));
     }
-    in_order(&mut frames, &mut warnings);
+    in_order(&mut frames, wanted.order, &mut warnings);
     let cameras: Vec<[f64; 4]> = frames.iter().filter_map(|f| f.focal_centre).collect();
     intrinsics.focal_centre = frame_camera::median(&cameras).unwrap_or(intrinsics.focal_centre);
 
@@ -108,11 +112,14 @@ fn read(folder: &Folder) -> Result<Entries, SequenceError> {
     Ok(Entries { frames, intrinsics, depth_unit_m, invalid_depth: None, bounds: None, warnings })
 }
 
-/// Frames by the numbers in the names of their files, and stamped.
-fn in_order(frames: &mut [Entry], warnings: &mut Vec<String>) {
+/// Frames by the numbers in the names of their files (unless the order of the list is wanted), and
+/// stamped.
+fn in_order(frames: &mut [Entry], order: FrameOrder, warnings: &mut Vec<String>) {
     let numbers: Vec<Option<u64>> = frames.iter().map(|f| last_number(&f.color.file)).collect();
     let distinct: BTreeSet<u64> = numbers.iter().flatten().copied().collect();
-    if distinct.len() == frames.len() {
+    if order == FrameOrder::File {
+        frames.iter_mut().enumerate().for_each(|(i, frame)| frame.number = i as u64);
+    } else if distinct.len() == frames.len() {
         for (frame, number) in frames.iter_mut().zip(numbers) {
             frame.number = number.unwrap_or(frame.number);
         }

@@ -1,5 +1,8 @@
 //! ScanNet as its exporter leaves it.
-use super::interface::{LayoutFiles, Mark, Parts};
+use super::{
+    interface::{LayoutFiles, Mark, Parts},
+    wanted::Wanted,
+};
 use crate::{
     entries::{Entries, Entry, depth_of},
     folder::{COLOR_ENDS, Folder, parse_matrix},
@@ -35,13 +38,13 @@ impl LayoutFiles for ScanNet {
         ]
     }
 
-    fn read(&self, folder: &Folder, _given: Option<&Intrinsics>) -> Result<Entries, SequenceError> {
-        read(folder)
+    fn read(&self, folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
+        read(folder, wanted)
     }
 }
 
 /// Reads everything but the images of `color/`, `depth/`, `pose/` and `intrinsic/`.
-fn read(folder: &Folder) -> Result<Entries, SequenceError> {
+fn read(folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
     let mut warnings = Vec::new();
     let colors = folder.numbered("color/", &COLOR_ENDS)?;
     let depths = folder.numbered("depth/", &[".png"])?;
@@ -55,10 +58,8 @@ fn read(folder: &Folder) -> Result<Entries, SequenceError> {
         };
         frames.push(Entry::of_files(number, color, depth, truth));
     }
-    let intrinsics = match intrinsics::read(folder)? {
-        Some(from_file) => from_file,
-        None => exported_camera(folder, &frames, &mut warnings)?,
-    };
+    let intrinsics =
+        wanted.camera_or(folder, || exported_camera(folder, &frames, &mut warnings))?;
     Ok(Entries {
         frames,
         intrinsics,

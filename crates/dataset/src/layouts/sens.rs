@@ -1,6 +1,9 @@
 //! ScanNet's packed recordings (`.sens`, version 4). Only the frames' headers are read at opening;
 //! images are read one by one later, so that memory does not grow with the file.
-use super::interface::{LayoutFiles, Mark, Parts};
+use super::{
+    interface::{LayoutFiles, Mark, Parts},
+    wanted::Wanted,
+};
 use crate::{
     decode::Origin,
     entries::{Entries, Entry},
@@ -40,7 +43,7 @@ impl LayoutFiles for Sens {
         vec![("<name>.sens", files_of(folder).len())]
     }
 
-    fn read(&self, folder: &Folder, _given: Option<&Intrinsics>) -> Result<Entries, SequenceError> {
+    fn read(&self, folder: &Folder, _wanted: &Wanted) -> Result<Entries, SequenceError> {
         read(folder)
     }
 }
