@@ -192,3 +192,25 @@ fn stamps_that_are_none_or_of_another_unit() {
     assert!(said.contains(part), "{said}");
     check_ends(in_order("ms-truth").as_mut(), false);
 }
+
+#[test]
+fn depth_too_near_and_too_far() {
+    let inspected = |name: &str| {
+        let mut s = faulty(name)?;
+        let opening = s.warnings().join("\n");
+        let found = inspect::inspect(s.as_mut(), Default::default(), |_, _| {}).unwrap();
+        Some((opening, found))
+    };
+    let Some((opening, found)) = inspected("mm-in-tum-notruth") else { return };
+    let parts = ["half of the depth is below", "nearer than rooms are", "--depth-scale 1000"];
+    assert!(parts.iter().all(|p| opening.contains(p)), "{opening}");
+    let warned = |r: &&inspect::Remark| r.severity == inspect::Severity::Warning;
+    let warnings: Vec<_> = found.remarks.iter().filter(warned).collect();
+    assert!(parts.iter().all(|p| warnings[0].text.contains(p)), "{warnings:?}");
+    for (name, range) in [("far5pct", 4.0..10.0), ("aims-2", 4.0..13.0)] {
+        let Some((_, found)) = inspected(name) else { return };
+        let said = format!("{name}: {:#?} {:#?}", found.depth, found.remarks);
+        assert!(found.depth.far.is_some_and(|far| range.contains(&far.limit_m)), "{said}");
+        assert!(found.remarks.iter().any(|r| r.text.contains("--max-depth")), "{said}");
+    }
+}

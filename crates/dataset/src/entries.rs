@@ -64,7 +64,7 @@ pub(super) struct Entries {
     pub frames: Vec<Entry>,
     pub intrinsics: Intrinsics,
     pub depth_unit_m: f64,
-    /// A depth value besides 0 that means "no measurement".
+    /// A depth value besides 0 that is known to mean "no measurement". 65535 does everywhere.
     pub invalid_depth: Option<u16>,
     pub bounds: Option<Bounds>,
     pub warnings: Vec<String>,

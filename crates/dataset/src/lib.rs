@@ -30,6 +30,8 @@ extern crate alloc;
 
 mod class_list;
 mod decode;
+mod depth_probe;
+mod depth_range;
 mod entries;
 mod features;
 mod folder;

@@ -2,6 +2,7 @@
 use super::{
     class_list::ClassList,
     decode::Size,
+    depth_probe::{self, DepthCode, Known},
     entries::Entry,
     features::FeatureFiles,
     folder::{Folder, invalid, plural},
@@ -98,6 +99,9 @@ pub struct OpenOptions {
     pub camera: Option<GivenCamera>,
     /// Units of depth per metre, instead of the layout's.
     pub depth_scale: Option<f64>,
+    /// Depth beyond this counts as not measured \[m\]. (65535, and what is found to be a sensor's
+    /// code for "nothing", always does.)
+    pub max_depth_m: Option<f64>,
     /// How the cameras of the ground-truth poses lie. Layouts with axes of their own (nerfstudio)
     /// are turned before; the default is right for them.
     pub axes: Axes,
@@ -133,6 +137,7 @@ impl Default for OpenOptions {
             layout: None,
             camera: None,
             depth_scale: None,
+            max_depth_m: None,
             axes: Axes::default(),
             order: FrameOrder::default(),
             start: 0,
@@ -173,6 +178,9 @@ pub fn open(
     }
     if let Some(units) = options.depth_scale.filter(|s| !(s.is_finite() && *s > 0.0)) {
         return wrong("depth scale", units.to_string(), "units of depth per metre > 0");
+    }
+    if let Some(limit) = options.max_depth_m.filter(|m| !(m.is_finite() && *m > 0.0)) {
+        return wrong("largest depth", limit.to_string(), "metres > 0");
     }
     let given = match options.camera {
         None => None,
@@ -227,6 +235,14 @@ pub fn open(
         let ((w, h), (to_w, to_h)) = (color_size, depth_size);
         warnings.push(format!("colour of {w}x{h} fitted to the {to_w}x{to_h} of depth"));
     }
+
+    let known = Known {
+        unit_m: all.depth_unit_m,
+        unit_given: options.depth_scale.is_some(),
+        hole: all.invalid_depth,
+        max_m: options.max_depth_m,
+    };
+    let depth_code = depth_probe::probe(&folder, &frames, depth_size, &known, &mut warnings);
 
     frame_camera::fit(&mut frames, &all.intrinsics, &camera, depth_size, &mut warnings)?;
     let color_to_depth = Resize::to_size(color_size, depth_size);
@@ -306,7 +322,7 @@ pub fn open(
         frames,
         depth_size,
         color_size,
-        invalid_depth: all.invalid_depth,
+        depth_code,
         color_to_depth,
         rectifier,
         resize,
@@ -336,7 +352,7 @@ struct Reader {
     frames: Vec<Entry>,
     depth_size: Size,
     color_size: Size,
-    invalid_depth: Option<u16>,
+    depth_code: DepthCode,
     color_to_depth: Resize,
     rectifier: Option<Rectifier>,
     resize: Resize,
@@ -386,11 +402,7 @@ impl Sequence for Reader {
         let color = entry.color.color(&self.folder, frame, self.color_size)?;
         let color = self.fit_color(color, entry.fit);
         let mut depth = entry.depth.depth(&self.folder, frame, self.depth_size)?;
-        if let Some(marker) = self.invalid_depth {
-            for d in depth.iter_mut().filter(|d| **d == marker) {
-                *d = 0;
-            }
-        }
+        self.depth_code.apply(&mut depth);
         let depth = self.fit_nearest(depth, entry.fit, 0);
 
         let labels = self.labels(index)?;
