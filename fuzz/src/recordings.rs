@@ -38,6 +38,7 @@ fn options(bytes: [u8; 4], layouts: &[Layout], bundle: &Bundle) -> OpenOptions {
         depth_scale: (given & 4 != 0).then_some(1000.0),
         axes: if given & 8 != 0 { Axes::OpenGl } else { Axes::OpenCv },
         order: if given & 32 != 0 { FrameOrder::File } else { FrameOrder::Time },
+        strict: given & 128 != 0,
         max_depth_m: (given & 64 != 0).then_some(2.5),
         features: if given & 16 != 0 { Some(folder()) } else { None },
         ..Default::default()

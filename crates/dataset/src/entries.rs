@@ -45,18 +45,17 @@ impl Entry {
     }
 }
 
-/// Returns the depth image that belongs to a colour image, or an error that says how it would be called.
+/// Returns the depth image that belongs to a number, or else the name that it would have: frames
+/// whose files are missing are left out by the reader, or refused.
 pub(super) fn depth_of(
     depths: &BTreeMap<u64, String>,
     number: u64,
-    color: &str,
     start: &str,
-) -> Result<String, SequenceError> {
-    let example = depths.values().next().map_or(start, String::as_str);
-    depths.get(&number).cloned().ok_or_else(|| SequenceError::Read {
-        file: format!("{start}{number}.png"),
-        reason: format!("missing: {color} has no depth image (they look like {example})"),
-    })
+    end: &str,
+) -> String {
+    let digits = |name: &String| name.len() - start.len() - end.len();
+    let width = depths.values().next().map_or(1, digits);
+    depths.get(&number).cloned().unwrap_or_else(|| format!("{start}{number:0width$}{end}"))
 }
 
 /// A recording before its images are decoded.

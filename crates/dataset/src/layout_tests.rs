@@ -164,7 +164,8 @@ fn transforms_are_read_as_they_are_meant() {
         replace(&mut m, TRANSFORMS, from, to);
         m
     };
-    let error = |from: &str, to: &str| error_of(&changed(from, to), OpenOptions::default());
+    let strict = || OpenOptions { strict: true, ..Default::default() };
+    let error = |from: &str, to: &str| error_of(&changed(from, to), strict());
     assert_has(&error("OPENCV", "OPENCV_FISHEYE"), &["camera_model", "OPENCV_FISHEYE", "PINHOLE"]);
     assert_has(&error("\"fl_x\"", "\"fl\""), &["fl_x", "nothing", "camera_angle_x"]);
     assert_has(&error("\"w\":24", "\"w\":24.5"), &["w: found 24.5"]);
@@ -182,6 +183,7 @@ fn transforms_are_read_as_they_are_meant() {
     let s = opened(&m).unwrap();
     assert_eq!(s.info().frames, 2);
     assert_has(&s.warnings().join(";"), &["1 frame without depth left out"]);
+    assert_has(&error_of(&m, strict()), &["(frame 0): depth: found nothing"]);
     // A field of view in place of a focal length, in other files.
     let angle = 2.0 * (12.0f64 / 20.0).atan();
     let m = changed("\"fl_x\":20.0", &format!("\"camera_angle_x\":{angle}"));
@@ -206,6 +208,8 @@ fn plain_folders_are_paired_by_number_or_by_order() {
     let s = opened(&fewer).unwrap();
     assert_eq!((s.info().frames, s.number(1)), (2, 2));
     assert_has(&s.warnings().join(";"), &["1 image without its partner"]);
+    let strict = OpenOptions { strict: true, ..Default::default() };
+    assert_has(&error_of(&fewer, strict), &["1 image without its partner", "for each number"]);
     // The pose is that of its number, though there are fewer frames than lines.
     let off = s.truth(1).unwrap().translation - frame(2).truth.unwrap().translation;
     assert!(off.length() < 1e-9);

@@ -107,6 +107,9 @@ pub struct OpenOptions {
     pub axes: Axes,
     /// In which order listed frames are taken.
     pub order: FrameOrder,
+    /// Refuse a recording of which a frame lacks an image, where such frames are otherwise left out
+    /// and said.
+    pub strict: bool,
     /// First frame, counted from 0 in the recording's order.
     pub start: usize,
     /// One frame in this many is used; at least 1.
@@ -140,6 +143,7 @@ impl Default for OpenOptions {
             max_depth_m: None,
             axes: Axes::default(),
             order: FrameOrder::default(),
+            strict: false,
             start: 0,
             stride: 1,
             frames: None,
@@ -153,8 +157,8 @@ impl Default for OpenOptions {
     }
 }
 
-/// Opens a recording: lists the files, reads poses, camera and classes, and checks that every
-/// frame in use has its files. Images are decoded frame by frame later.
+/// Opens a recording: lists the files, reads poses, camera and classes, and leaves out
+/// the frames whose images are not there. Images are decoded frame by frame later.
 ///
 /// # Errors
 /// Any [`SequenceError`]: an unknown layout, missing files, a file that is not what it should be
@@ -190,7 +194,8 @@ pub fn open(
         }
     };
     let layout = Layout::detect(&mut folder, options.layout, given.is_some())?;
-    let mut all = layout.read(&folder, &Wanted { camera: given, order: options.order })?;
+    let wanted = Wanted { camera: given, order: options.order, strict: options.strict };
+    let mut all = layout.read(&folder, &wanted)?;
     let mut warnings = folder.notes();
     warnings.append(&mut all.warnings);
     if let Some(units) = options.depth_scale {
@@ -208,6 +213,7 @@ pub fn open(
             stored.file = real.into();
         }
     }
+    leave_out_missing(&folder, &mut all.frames, options.strict, &mut warnings)?;
     let there = all.frames.len();
     let wanted = options.frames.unwrap_or(usize::MAX);
     let mut frames: Vec<Entry> =
@@ -217,15 +223,6 @@ pub fn open(
         let expected = format!("less than {there}, the number of frames");
         return Err(invalid(&folder.name(), None, "start", found, expected));
     };
-    for frame in &frames {
-        for file in [&frame.color.file, &frame.depth.file] {
-            if !folder.has(file) {
-                let number = frame.number;
-                let reason = format!("no such file in {} (frame {number})", folder.name());
-                return Err(SequenceError::Read { file: file.clone(), reason });
-            }
-        }
-    }
 
     let depth_size = first.depth.size(&folder, first.number, "depth image")?;
     let color_size = first.color.size(&folder, first.number, "colour image")?;
@@ -330,6 +327,35 @@ pub fn open(
         features,
         warnings,
     }))
+}
+
+/// Takes out the frames whose images are not there, and says so; an error where it is to be strict,
+/// or where no frame is left.
+fn leave_out_missing(
+    folder: &Folder,
+    frames: &mut Vec<Entry>,
+    strict: bool,
+    warnings: &mut Vec<String>,
+) -> Result<(), SequenceError> {
+    let there = frames.len();
+    let mut first: Option<(String, u64, String)> = None;
+    frames.retain(|frame| {
+        let (color, depth) = (&frame.color.file, &frame.depth.file);
+        let missing = [(color, depth), (depth, color)].into_iter().find(|(f, _)| !folder.has(f));
+        if let (Some((file, other)), None) = (missing, &first) {
+            first = Some((file.clone(), frame.number, other.clone()));
+        }
+        missing.is_none()
+    });
+    let Some((file, number, other)) = first else { return Ok(()) };
+    if strict || frames.is_empty() {
+        let reason = format!("no such file in {} (frame {number}, beside {other})", folder.name());
+        return Err(SequenceError::Read { file, reason });
+    }
+    let left_out = plural(there - frames.len(), "frame");
+    warnings
+        .push(format!("{left_out} left out for missing images, the first {file} (frame {number})"));
+    Ok(())
 }
 
 /// Colour is stretched to the size of depth, which is right only when both show the same.

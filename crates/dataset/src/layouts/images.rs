@@ -84,7 +84,7 @@ fn listed<'a>(folder: &'a Folder, folders: &[&str], ends: &[&str]) -> Vec<&'a st
 /// Reads everything but the images.
 fn read(folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
     let mut warnings = Vec::new();
-    let pairs = paired(folder, &mut warnings)?;
+    let pairs = paired(folder, wanted.strict, &mut warnings)?;
     let distinct: BTreeSet<u64> = pairs.iter().filter_map(|(c, _)| last_number(c)).collect();
     let numbered = distinct.len() == pairs.len();
     let mut frames: Vec<Entry> = pairs
@@ -117,6 +117,7 @@ fn read(folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
 /// both, in the same place of their orders.
 fn paired<'a>(
     folder: &'a Folder,
+    strict: bool,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<(&'a str, &'a str)>, SequenceError> {
     let (colors, depths) = (colors(folder), depths(folder));
@@ -130,6 +131,11 @@ fn paired<'a>(
     let distinct = by_color.len() == colors.len() && by_depth.len() == depths.len();
     if distinct && !pairs.is_empty() {
         let alone = colors.len() + depths.len() - 2 * pairs.len();
+        if alone > 0 && strict {
+            let found = format!("{} without its partner", plural(alone, "image"));
+            let expected = "colour and depth for each number";
+            return Err(invalid(&folder.name(), None, "images", found, expected));
+        }
         if alone > 0 {
             warnings.push(format!("{} without its partner left out", plural(alone, "image")));
         }

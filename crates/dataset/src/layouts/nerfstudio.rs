@@ -71,11 +71,14 @@ fn read(folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
             invalid(FILE, Some(number), "file_path", "nothing", "the path of the colour image")
         })?;
         let Some(depth) = path("depth_file_path").or_else(|| path("depth_path")) else {
+            if wanted.strict {
+                let expected = "depth_file_path or depth_path";
+                return Err(invalid(FILE, Some(number), "depth", "nothing", expected));
+            }
             without_depth += 1;
             continue;
         };
-        let color = existing(folder, number, color)?;
-        let depth = existing(folder, number, depth)?;
+        let (color, depth) = (existing(folder, color), existing(folder, depth));
         let truth = match frame.get("transform_matrix") {
             None | Some(Value::Null) => None,
             Some(rows) => pose(number, rows)?,
@@ -208,15 +211,14 @@ fn camera(json: &Value, frame: &Value, number: u64) -> Result<Intrinsics, Sequen
     checked(FILE, Intrinsics { distortion, scales: true, ..camera })
 }
 
-/// The file that a path means: relative to the folder, perhaps without its ending.
-fn existing(folder: &Folder, frame: u64, path: &str) -> Result<String, SequenceError> {
+/// The file that a path means: relative to the folder, perhaps without its ending. Where there is
+/// none, the name that it would have.
+fn existing(folder: &Folder, path: &str) -> String {
     let name = path.replace('\\', "/");
     let name = name.trim_start_matches("./");
     let endings = [""].into_iter().chain(COLOR_ENDS);
-    endings.map(|end| format!("{name}{end}")).find(|n| folder.has(n)).ok_or_else(|| {
-        let reason = format!("no such file in {} ({FILE}, frame {frame})", folder.name());
-        SequenceError::Read { file: name.into(), reason }
-    })
+    let found = endings.map(|end| format!("{name}{end}")).find(|n| folder.has(n));
+    found.unwrap_or_else(|| name.into())
 }
 
 /// Rows of 4 numbers, 3 or 4 of them; camera axes turned from OpenGL's to ours.

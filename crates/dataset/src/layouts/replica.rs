@@ -64,10 +64,10 @@ pub(super) fn read(
     };
     let mut frames = Vec::with_capacity(numbers.len());
     for ((number, color), truth) in colors.into_iter().zip(poses) {
-        let depth = depth_of(&depths, number, &color, depth_start)?;
+        let depth = depth_of(&depths, number, depth_start, ".png");
         frames.push(Entry::of_files(number, color, depth, truth));
     }
-    let surplus = depths.len() - frames.len();
+    let surplus = depths.keys().filter(|n| numbers.binary_search(n).is_err()).count();
     if surplus > 0 {
         warnings
             .push(format!("{} without a colour image left out", plural(surplus, "depth image")));

@@ -51,7 +51,7 @@ fn read(folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
     let poses = folder.numbered("pose/", &[".txt"])?;
     let mut frames = Vec::with_capacity(colors.len());
     for (number, color) in colors {
-        let depth = depth_of(&depths, number, &color, "depth/")?;
+        let depth = depth_of(&depths, number, "depth/", ".png");
         let truth = match poses.get(&number) {
             Some(file) => parse_matrix(file, Some(number), &folder.text(file)?)?,
             None => None,

@@ -4,7 +4,7 @@ use super::{
     wanted::Wanted,
 };
 use crate::{
-    entries::{Entries, Entry},
+    entries::{Entries, Entry, depth_of},
     folder::{Folder, parse_matrix},
     intrinsics::Intrinsics,
 };
@@ -43,10 +43,7 @@ impl LayoutFiles for SevenScenes {
         let poses = folder.numbered("frame-", &[".pose.txt"])?;
         let mut frames = Vec::with_capacity(colors.len());
         for (number, color) in colors {
-            let depth = depths.get(&number).cloned().ok_or_else(|| SequenceError::Read {
-                file: format!("frame-{number:06}.depth.png"),
-                reason: format!("missing: {color} has no depth image"),
-            })?;
+            let depth = depth_of(&depths, number, "frame-", ".depth.png");
             let truth = match poses.get(&number) {
                 Some(file) => parse_matrix(file, Some(number), &folder.text(file)?)?,
                 None => None,

@@ -13,6 +13,8 @@ pub(crate) struct Wanted {
     pub camera: Option<Intrinsics>,
     /// The order of listed frames.
     pub order: FrameOrder,
+    /// Whether frames with missing images are an error, in place of being left out.
+    pub strict: bool,
 }
 
 impl Wanted {
