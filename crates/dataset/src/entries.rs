@@ -1,12 +1,14 @@
 //! What each layout boils down to: a list of frames with file names, and a camera.
 use super::{
-    folder::{Folder, invalid, parse_matrix, plural},
-    frame_camera::Fit,
+    decode::Size,
+    folder::{Folder, invalid, plural},
+    frame_camera::{Fit, LEAST_PIXELS},
     intrinsics::Intrinsics,
+    pose_text::{lines, parse_line},
     stored::Stored,
 };
 use glam::DVec3;
-use mte_slam_types::{frame::Bounds, pose::Pose, sequence::SequenceError};
+use mte_slam_types::{camera::Camera, frame::Bounds, pose::Pose, sequence::SequenceError};
 use std::collections::BTreeMap;
 
 /// One frame before its images are decoded.
@@ -96,6 +98,41 @@ impl Entries {
     }
 }
 
+/// Decides which frames must be brought into the common camera, and says it.
+pub(super) fn fit_cameras(
+    frames: &mut [Entry],
+    intrinsics: &Intrinsics,
+    common: &Camera,
+    size: Size,
+    warnings: &mut Vec<String>,
+) -> Result<(), SequenceError> {
+    let (mut own, mut moved, mut farthest) = (0, 0, 0.0f64);
+    for frame in frames.iter_mut() {
+        let Some(focal_centre) = frame.focal_centre else { continue };
+        let camera = Intrinsics { focal_centre, ..intrinsics.clone() };
+        let fit = Fit::new(common, &camera.camera(&frame.depth.file, size)?);
+        let pixels = fit.farthest(size);
+        own += 1;
+        farthest = farthest.max(pixels);
+        if pixels >= LEAST_PIXELS {
+            moved += 1;
+            frame.fit = Some(fit);
+        }
+    }
+    if own > 0 && farthest > 0.0 {
+        let what = match moved {
+            0 => "the median is taken for all".into(),
+            n => format!("{} brought into the median camera", plural(n, "frame")),
+        };
+        let from = &intrinsics.from;
+        warnings.push(format!(
+            "{from}: the frames have cameras of their own, which differ from their median by up to \
+             {farthest:.2} pixels: {what}"
+        ));
+    }
+    Ok(())
+}
+
 /// Reads one pose per line. As many lines as images: line i belongs to the i-th image. More lines (when
 /// only some of the images were kept): line n belongs to image number n.
 pub(super) fn trajectory(
@@ -104,24 +141,26 @@ pub(super) fn trajectory(
     numbers: &[u64],
 ) -> Result<Vec<Option<Pose>>, SequenceError> {
     let text = folder.text(file)?;
-    let lines: Vec<&str> = text.lines().filter(|l| !l.trim().is_empty()).collect();
-    let by_number = lines.len() != numbers.len();
-    let fits = numbers.last().is_none_or(|&last| last < lines.len() as u64);
-    if by_number && !fits {
-        return Err(invalid(
+    let lines = lines(&text);
+    let places = places(lines.len(), numbers).ok_or_else(|| {
+        invalid(
             file,
             None,
             "poses",
             plural(lines.len(), "line"),
             format!("{}, one for each colour image", plural(numbers.len(), "line")),
-        ));
-    }
-    let line_of = |(i, &number): (usize, &u64)| if by_number { number as usize } else { i };
-    numbers
-        .iter()
-        .enumerate()
-        .map(|(i, number)| parse_matrix(file, Some(*number), lines[line_of((i, number))]))
-        .collect()
+        )
+    })?;
+    let poses = places.zip(numbers);
+    poses.map(|(place, number)| parse_line(file, Some(*number), lines[place])).collect()
+}
+
+/// Which of `poses` poses belongs to each image; `None` where they do not fit.
+pub(super) fn places(poses: usize, numbers: &[u64]) -> Option<impl Iterator<Item = usize>> {
+    let by_number = poses != numbers.len();
+    let fits = numbers.iter().all(|&number| number < poses as u64);
+    let place = move |(i, &number): (usize, &u64)| if by_number { number as usize } else { i };
+    (fits || !by_number).then(|| numbers.iter().enumerate().map(place))
 }
 
 /// `bound.json`: {"bound": [[x0, x1], [y0, y1], [z0, z1]]}.

@@ -1,9 +1,6 @@
 //! The files of a recording by name and by number, and the plain text among them.
 use super::names::Names;
-use mte_slam_types::{
-    pose::Pose,
-    sequence::{SequenceError, Source},
-};
+use mte_slam_types::sequence::{SequenceError, Source};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Shorthand for [`SequenceError::Invalid`].
@@ -30,7 +27,13 @@ const MAX_TEXT_BYTES: usize = 400 << 20;
 pub(super) const COLOR_ENDS: [&str; 3] = [".jpg", ".png", ".jpeg"];
 
 /// Files beside scenes that belong to all of them.
-const SHARED: [&str; 2] = ["cam_params.json", "scannetv2-labels.combined.tsv"];
+const SHARED: [&str; 5] = [
+    "cam_params.json",
+    "intrinsics.json",
+    "camera-intrinsics.txt",
+    "camera.txt",
+    "scannetv2-labels.combined.tsv",
+];
 
 /// A source with its list of names, seen from the folder in which the recording lies. Names are
 /// compared without case: those that it lists are in lower case, and others find theirs, too.
@@ -174,10 +177,15 @@ impl Folder {
         })
     }
 
-    /// Reads a JSON file.
+    /// Reads a JSON file. Numbers that are none, which Python writes as `NaN` and `Infinity`, become
+    /// texts: what needs a number there says so.
     pub fn json(&self, name: &str) -> Result<serde_json::Value, SequenceError> {
-        serde_json::from_str(&self.text(name)?)
-            .map_err(|e| invalid(name, None, "JSON", e.to_string(), "a JSON document"))
+        let text = self.text(name)?;
+        let parsed = serde_json::from_str(&text);
+        parsed.or_else(|_| serde_json::from_str(&with_quoted_words(&text))).map_err(|e| {
+            let found = e.to_string();
+            invalid(name.trim_start_matches('/'), None, "JSON", found, "a JSON document")
+        })
     }
 
     /// Returns all files `START number END` for one of the ends, by number. Digits may or may not be
@@ -220,30 +228,35 @@ pub(super) fn number_between(name: &str, start: &str, end: &str) -> Option<u64> 
     digits.bytes().all(|b| b.is_ascii_digit()).then(|| digits.parse().ok()).flatten()
 }
 
-/// Returns a pose as 16 row-major numbers. `Ok(None)` when any of them is not finite, which is how data
-/// sets say "no pose".
-pub(super) fn parse_matrix(
-    file: &str,
-    frame: Option<u64>,
-    text: &str,
-) -> Result<Option<Pose>, SequenceError> {
-    let numbers = parse_numbers(file, frame, text)?;
-    let matrix: &[f64; 16] = numbers.as_slice().try_into().map_err(|_| {
-        invalid(file, frame, "pose", format!("{} numbers", numbers.len()), "16 numbers")
-    })?;
-    if matrix.iter().any(|x| !x.is_finite()) {
-        return Ok(None);
+/// Puts `NaN`, `Infinity` and `-Infinity` into quotes where they stand outside of texts.
+fn with_quoted_words(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(at) = rest.find(['"', 'N', 'I', '-']) {
+        out += &rest[..at];
+        rest = &rest[at..];
+        let end = if rest.starts_with('"') {
+            // To the end of the text; what is escaped does not end it.
+            let mut escaped = false;
+            let ends = |c: char| {
+                let end = c == '"' && !escaped;
+                escaped = c == '\\' && !escaped;
+                end
+            };
+            rest[1..].find(ends).map_or(rest.len(), |n| n + 2)
+        } else {
+            let word = ["NaN", "Infinity", "-Infinity"].iter().find(|w| rest.starts_with(**w));
+            if let Some(word) = word {
+                out += &format!("\"{word}\"");
+                rest = &rest[word.len()..];
+                continue;
+            }
+            1
+        };
+        out += &rest[..end];
+        rest = &rest[end..];
     }
-    match Pose::from_row_major(matrix) {
-        Some(pose) => Ok(Some(pose)),
-        None => Err(invalid(
-            file,
-            frame,
-            "pose",
-            "a matrix whose upper left 3x3 block is not a rotation",
-            "a rigid transform, world_from_camera",
-        )),
-    }
+    out + rest
 }
 
 /// Returns all numbers of a text, separated by white space.
@@ -307,6 +320,23 @@ mod tests {
         let got: Vec<_> = f.numbered("a_", &[".png"]).unwrap().into_iter().collect();
         assert_eq!(got, [(9, "a_9.png".into()), (10, "a_10.png".into())]);
         assert!(folder(&["a1.png", "a01.png"]).numbered("a", &[".png"]).is_err());
+    }
+
+    #[test]
+    fn numbers_that_are_none_are_texts_in_json() {
+        let json = |text: &str| {
+            let mut m = MemorySource::new("m");
+            m.insert("a.json", text);
+            Folder::new(Box::new(m)).unwrap().json("a.json")
+        };
+        let text =
+            r#"{"NaN": [NaN, -Infinity, Infinity, -1, 2], "a\\": "\"NaN, -Infinity", "I": 1}"#;
+        let got = json(text).unwrap();
+        assert_eq!(got["NaN"], serde_json::json!(["NaN", "-Infinity", "Infinity", -1, 2]));
+        assert_eq!((got["a\\"].as_str(), got["I"].as_i64()), (Some("\"NaN, -Infinity"), Some(1)));
+        for bad in ["{\"a", "{\"a\": Nan}", "[-]", "[NaN", "\"\\"] {
+            assert!(json(bad).unwrap_err().to_string().contains("a.json: JSON"), "{bad}");
+        }
     }
 
     #[test]

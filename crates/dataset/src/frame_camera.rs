@@ -1,11 +1,11 @@
 //! Frames with a camera of their own, such as those of phones whose lens moves to focus. No
 //! rotation lies between two cameras of one place, so that images of one become those of the
 //! other by a factor and a shift of each axis.
-use super::{decode::Size, entries::Entry, folder::plural, intrinsics::Intrinsics};
-use mte_slam_types::{camera::Camera, sequence::SequenceError};
+use super::decode::Size;
+use mte_slam_types::camera::Camera;
 
 /// Images that would move by less than this everywhere stay as they are \[pixels\].
-const LEAST_PIXELS: f64 = 0.5;
+pub(super) const LEAST_PIXELS: f64 = 0.5;
 
 /// Where the pixels of the common camera lie in a frame's own images.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,7 +16,7 @@ pub(super) struct Fit {
 
 impl Fit {
     /// From the common camera to a frame's own, of images of the same size.
-    fn new(common: &Camera, own: &Camera) -> Fit {
+    pub fn new(common: &Camera, own: &Camera) -> Fit {
         let factor = [own.fx / common.fx, own.fy / common.fy];
         let shift = [own.cx - factor[0] * common.cx, own.cy - factor[1] * common.cy];
         Fit { factor, shift }
@@ -27,7 +27,7 @@ impl Fit {
     }
 
     /// How far a pixel moves, at most.
-    fn farthest(&self, size: Size) -> f64 {
+    pub fn farthest(&self, size: Size) -> f64 {
         // Affine along each axis, so that the ends move most.
         let moved = |axis: usize, side: u32| {
             let end = |pixel: u32| (self.place(axis, pixel) - f64::from(pixel)).abs();
@@ -94,41 +94,6 @@ pub(super) fn median(cameras: &[[f64; 4]]) -> Option<[f64; 4]> {
         let mut values: Vec<f64> = cameras.iter().map(|c| c[i]).collect();
         *values.select_nth_unstable_by((cameras.len() - 1) / 2, f64::total_cmp).1
     }))
-}
-
-/// Decides which frames must be brought into the common camera, and says it.
-pub(super) fn fit(
-    frames: &mut [Entry],
-    intrinsics: &Intrinsics,
-    common: &Camera,
-    size: Size,
-    warnings: &mut Vec<String>,
-) -> Result<(), SequenceError> {
-    let (mut own, mut moved, mut farthest) = (0, 0, 0.0f64);
-    for frame in frames.iter_mut() {
-        let Some(focal_centre) = frame.focal_centre else { continue };
-        let camera = Intrinsics { focal_centre, ..intrinsics.clone() };
-        let fit = Fit::new(common, &camera.camera(&frame.depth.file, size)?);
-        let pixels = fit.farthest(size);
-        own += 1;
-        farthest = farthest.max(pixels);
-        if pixels >= LEAST_PIXELS {
-            moved += 1;
-            frame.fit = Some(fit);
-        }
-    }
-    if own > 0 && farthest > 0.0 {
-        let what = match moved {
-            0 => "the median is taken for all".into(),
-            n => format!("{} brought into the median camera", plural(n, "frame")),
-        };
-        let from = &intrinsics.from;
-        warnings.push(format!(
-            "{from}: the frames have cameras of their own, which differ from their median by up to \
-             {farthest:.2} pixels: {what}"
-        ));
-    }
-    Ok(())
 }
 
 #[cfg(test)]

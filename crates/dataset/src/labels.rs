@@ -214,6 +214,18 @@ impl Labels {
     }
 }
 
+/// Says which files beside the frames look like label images and are none.
+pub(super) fn unreadable(folder: &Folder) -> Option<String> {
+    let is_jpeg = |n: &&str| n.ends_with(".jpg") || n.ends_with(".jpeg");
+    FOLDERS.into_iter().find_map(|below| {
+        let n = folder.names().filter(|n| n.starts_with(below)).filter(is_jpeg).count();
+        let images = plural(n, "JPEG image");
+        (n > 0).then(|| {
+            format!("{images} in {below} left out: labels are PNGs, for JPEG changes the ids")
+        })
+    })
+}
+
 /// Returns the ids of a label image in `size`, and its own size.
 fn decode(
     folder: &Folder,

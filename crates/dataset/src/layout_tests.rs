@@ -177,6 +177,9 @@ fn transforms_are_read_as_they_are_meant() {
     assert_has(&error("\"frames\"", "\"frame\""), &["frames", "a list of frames"]);
     assert_has(&error("{", "{\"k4\": 0.1, "), &["k4"]);
     assert_has(&error("integer_depth_scale\":", "integer_depth_scale\":-"), &["metres per unit"]);
+    // Python writes what is no number so.
+    assert_has(&error("\"fl_x\":20.0", "\"fl_x\":NaN"), &["fl_x", "found \"NaN\"", "a number"]);
+    assert_has(&error("\"cx\":12.0", "\"cx\":-Infinity"), &["cx", "\"-Infinity\""]);
     // Depth of one frame is missing, and the pose of another.
     let mut m = changed("depth_file_path", "depth_file");
     replace(&mut m, TRANSFORMS, "transform_matrix", "transform");
@@ -470,4 +473,110 @@ fn saturated_and_far_depth_is_a_hole_in_every_layout() {
         let options = OpenOptions { max_depth_m: Some(max_depth_m), ..Default::default() };
         assert_has(&error_of(&replica(1), options), &["largest depth", "metres > 0"]);
     }
+}
+
+#[test]
+fn poses_that_are_none_are_left_out_and_counted() {
+    for (at, number) in [("[[", "NaN"), ("[[", "Infinity")] {
+        let mut m = renamed(3, Layout::Nerfstudio);
+        let text = String::from_utf8(m.get(TRANSFORMS).unwrap().to_vec()).unwrap();
+        let (before, after) = text.rsplit_once(at).unwrap();
+        let (_, after) = after.split_once(',').unwrap();
+        m.insert(TRANSFORMS, format!("{before}{at}{number},{after}"));
+        let s = opened(&m).unwrap();
+        assert_eq!((s.truth(0), s.truth(1).is_some()), (None, true), "{number}");
+        assert_has(&s.warnings().join(";"), &["1 frame without a ground-truth pose"]);
+    }
+    let mut m = renamed(3, Layout::ScanNet);
+    m.insert("pose/1.txt", ["0"; 16].join(" "));
+    let s = opened(&m).unwrap();
+    assert_eq!((s.truth(1), s.truth(2).is_some()), (None, true));
+    let mut m = sens(2);
+    let mut bytes = m.get("tiny.sens").unwrap().to_vec();
+    let name = u64::from_le_bytes(bytes[4..12].try_into().unwrap()) as usize;
+    let first = 12 + name + 4 * 64 + 2 * 4 + 4 * 4 + 4 + 8;
+    bytes[first..first + 64].fill(0);
+    m.insert("tiny.sens", bytes);
+    let s = opened(&m).unwrap();
+    assert_eq!((s.truth(0), s.truth(1).is_some()), (None, true));
+}
+
+#[test]
+fn poses_of_other_programs_beside_plain_images() {
+    let plain = renamed(3, Layout::Images);
+    let lines = String::from_utf8(plain.get("poses.txt").unwrap().to_vec()).unwrap();
+    let numbers: Vec<Vec<&str>> = lines.lines().map(|l| l.split_whitespace().collect()).collect();
+    let log = |poses: &[Vec<&str>]| -> String {
+        let one = |(i, n): (usize, &Vec<&str>)| {
+            let rows: Vec<String> = n.chunks(4).map(|row| row.join(" ")).collect();
+            format!("{i} {i} {}\n{}\n", i + 1, rows.join("\n"))
+        };
+        poses.iter().enumerate().map(one).collect()
+    };
+    let rows: String = numbers.iter().map(|n| n[..12].join(" ") + "\n").collect();
+    let quaternions: String = (0..3)
+        .map(|i| {
+            let pose = frame(i).truth.unwrap();
+            let (t, q) = (pose.translation, pose.quaternion());
+            format!("{} {} {} {} {} {} {}\n", t.x, t.y, t.z, q.x, q.y, q.z, q.w)
+        })
+        .collect();
+    let with = |file: &str, text: String| {
+        let mut m = plain.clone();
+        m.remove("poses.txt");
+        m.insert(file, text);
+        opened(&m).unwrap()
+    };
+    for (file, text) in
+        [("trajectory.log", log(&numbers)), ("pose.txt", rows), ("pose.txt", quaternions)]
+    {
+        let s = with(file, text);
+        for i in 0..3 {
+            let off = s.truth(i).unwrap().compose(&frame(i).truth.unwrap().inverse());
+            assert!(off.translation.length() < 1e-9 && off.angle_rad() < 1e-6, "{file} {i}");
+        }
+        assert_eq!(s.warnings(), Vec::<String>::new(), "{file}");
+    }
+    let s = with("trajectory.log", log(&numbers[..2]));
+    assert_eq!(s.truth(0), None);
+    let parts = ["not taken as ground truth: trajectory.log", "2 poses", "3, one for each"];
+    assert_has(&s.warnings().join(";"), &parts);
+    let s = with("pose.txt", "of the lamp".into());
+    assert_has(&s.warnings().join(";"), &["not taken as ground truth: pose.txt", "1 line"]);
+}
+
+#[test]
+fn labels_as_jpeg_are_said() {
+    let mut m = replica(3);
+    for i in 0..3 {
+        let label = m.remove(&format!("semantic_class/semantic_class_{i:06}.png")).unwrap();
+        m.insert(format!("semantic_class/semantic_class_{i:06}.jpg"), label);
+    }
+    let mut s = opened(&m).unwrap();
+    assert_eq!(s.frame(0).unwrap().labels, None);
+    assert_has(&s.warnings().join(";"), &["3 JPEG images in semantic_class/", "PNG"]);
+}
+
+#[test]
+fn cameras_may_lie_above_the_recording() {
+    let camera = |m: &mut MemorySource| m.remove("intrinsics.json").unwrap();
+    for above in ["../intrinsics.json", "../../intrinsics.json"] {
+        let mut m = renamed(2, Layout::Images);
+        let bytes = camera(&mut m);
+        m.insert(above, bytes);
+        assert_eq!(opened(&m).unwrap().info().camera, info().camera, "{above}");
+    }
+    // In an archive with one folder of images.
+    let mut m = renamed(2, Layout::Images);
+    let bytes = camera(&mut m);
+    let mut m = under_names(&m, |n| format!("scans/kitchen/{n}"));
+    m.insert("scans/intrinsics.json", bytes);
+    let s = opened(&m).unwrap();
+    assert_eq!((s.info().camera, s.info().name.as_str()), (info().camera, "kitchen"));
+    let mut m = renamed(2, Layout::Tum);
+    m.remove("cam_params.json");
+    m.insert("../camera.txt", "20 21 11.5 7.25");
+    assert_eq!(opened(&m).unwrap().info().camera, info().camera);
+    m.insert("../camera.txt", "20 21 11.5");
+    assert_has(&error_of(&m, OpenOptions::default()), &["../camera.txt", "3 numbers"]);
 }

@@ -7,10 +7,11 @@
 //!
 //! Files that any layout may hold beside its own:
 //! - the camera: `cam_params.json` (`{"camera": {w, h, fx, fy, cx, cy, scale}}`, `scale` in depth
-//!   units per metre, `k1 k2 p1 p2 k3` if there is distortion; also up to two folders up),
+//!   units per metre, `k1 k2 p1 p2 k3` if there is distortion),
 //!   `intrinsics.json` (the inner object alone, `depth_scale` for `scale`; it marks the layout
 //!   `images`, and fits images of its proportions in another size), `camera-intrinsics.txt` (a
-//!   3x3 or 4x4 matrix) or `camera.txt` (`fx fy cx cy [k1 k2 p1 p2 k3]`);
+//!   3x3 or 4x4 matrix) or `camera.txt` (`fx fy cx cy [k1 k2 p1 p2 k3]`), each also up to
+//!   two folders up;
 //! - feature maps, in a folder of their own: `000000.npy` or `000000.safetensors` (the tensor
 //!   `features`, or the only one), ... by frame number, channels x height x width, float32 or
 //!   float16;
@@ -45,6 +46,7 @@ mod layouts;
 mod memory;
 mod names;
 mod order;
+mod pose_text;
 mod reader;
 mod resize;
 mod scannet_ids;

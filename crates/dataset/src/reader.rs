@@ -3,12 +3,12 @@ use super::{
     class_list::ClassList,
     decode::Size,
     depth_probe::{self, DepthCode, Known},
-    entries::Entry,
+    entries::{Entry, fit_cameras},
     features::FeatureFiles,
     folder::{Folder, invalid, plural},
-    frame_camera::{self, Fit},
+    frame_camera::Fit,
     intrinsics::{Intrinsics, Rectifier, checked},
-    labels::{LabelOptions, Labels},
+    labels::{self, LabelOptions, Labels},
     layouts::{Layout, Wanted},
     order::FrameOrder,
     resize::{Resize, same_aspect},
@@ -241,7 +241,7 @@ pub fn open(
     };
     let depth_code = depth_probe::probe(&folder, &frames, depth_size, &known, &mut warnings);
 
-    frame_camera::fit(&mut frames, &all.intrinsics, &camera, depth_size, &mut warnings)?;
+    fit_cameras(&mut frames, &all.intrinsics, &camera, depth_size, &mut warnings)?;
     let color_to_depth = Resize::to_size(color_size, depth_size);
     let rectifier = if all.intrinsics.distortion == [0.0; 5] {
         None
@@ -272,6 +272,7 @@ pub fn open(
     let labels = match options.labels {
         LabelSource::None => None,
         LabelSource::Dataset => {
+            warnings.extend(labels::unreadable(&folder));
             Labels::open(&folder, None, &mut frames, depth_size, classes_wanted)?
         }
         LabelSource::Folder(source) => {

@@ -11,6 +11,7 @@ use crate::{
     frame_camera,
     intrinsics::{Intrinsics, checked},
     order::FrameOrder,
+    pose_text,
 };
 use mte_slam_types::{pose::Pose, sequence::SequenceError};
 use serde_json::Value;
@@ -235,10 +236,13 @@ fn pose(frame: u64, rows: &Value) -> Result<Option<Pose>, SequenceError> {
     let mut matrix = Pose::IDENTITY.to_row_major();
     for (y, row) in rows.iter().take(3).enumerate() {
         for (x, value) in row.iter().enumerate() {
-            // JSON has no infinities; what is no number means that there is no pose.
+            // What is no number means that there is no pose.
             let Some(number) = value.as_f64().filter(|n| n.is_finite()) else { return Ok(None) };
             matrix[4 * y + x] = number;
         }
+    }
+    if pose_text::is_none(&matrix) {
+        return Ok(None);
     }
     match Pose::from_row_major(&matrix) {
         Some(pose) => Ok(Some(pose.with_flipped_camera())),

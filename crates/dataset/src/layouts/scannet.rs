@@ -5,8 +5,9 @@ use super::{
 };
 use crate::{
     entries::{Entries, Entry, depth_of},
-    folder::{COLOR_ENDS, Folder, parse_matrix},
+    folder::{COLOR_ENDS, Folder},
     intrinsics::{self, Intrinsics},
+    pose_text::parse_matrix,
 };
 use mte_slam_types::sequence::SequenceError;
 

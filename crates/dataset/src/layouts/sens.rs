@@ -9,6 +9,7 @@ use crate::{
     entries::{Entries, Entry},
     folder::{Folder, invalid},
     intrinsics::Intrinsics,
+    pose_text,
     stored::{Coding, Part, Stored},
 };
 use mte_slam_types::{pose::Pose, sequence::SequenceError};
@@ -198,9 +199,9 @@ fn read(folder: &Folder) -> Result<Entries, SequenceError> {
         let matrix = fields.matrix();
         let (time_us, _depth_time) = (fields.u64(), fields.u64());
         let lengths = [fields.u64(), fields.u64()];
-        let truth = match matrix.iter().all(|x| x.is_finite()) {
-            false => None,
-            true => Some(Pose::from_row_major(&matrix).ok_or_else(|| {
+        let truth = match pose_text::is_none(&matrix) {
+            true => None,
+            false => Some(Pose::from_row_major(&matrix).ok_or_else(|| {
                 let found = "a matrix whose upper left 3x3 block is not a rotation";
                 cursor.error("pose", found, "a rigid transform, world_from_camera")
             })?),

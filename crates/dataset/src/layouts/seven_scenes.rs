@@ -5,8 +5,9 @@ use super::{
 };
 use crate::{
     entries::{Entries, Entry, depth_of},
-    folder::{Folder, parse_matrix},
+    folder::Folder,
     intrinsics::Intrinsics,
+    pose_text::parse_matrix,
 };
 use mte_slam_types::sequence::SequenceError;
 

@@ -9,8 +9,8 @@ use crate::{
     folder::{Folder, invalid, parse_numbers, plural, shortened},
     intrinsics::{Distortion, Intrinsics},
     order::FrameOrder,
+    pose_text::of_quaternion,
 };
-use glam::{DQuat, DVec3};
 use mte_slam_types::{pose::Pose, sequence::SequenceError};
 
 const COLOR_LIST: &str = "rgb.txt";
@@ -248,13 +248,12 @@ fn ground_truth(folder: &Folder, file: &str) -> Result<Vec<(f64, Option<Pose>)>,
                 "8: stamp tx ty tz qx qy qz qw",
             ));
         };
-        let (t, q) = (DVec3::new(x, y, z), DQuat::from_xyzw(qx, qy, qz, qw));
-        let given = t.is_finite() && q.is_finite() && q != DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
-        if !stamp.is_finite() || (given && (q.length() - 1.0).abs() > 0.05) {
+        let pose = of_quaternion([x, y, z], [qx, qy, qz, qw]);
+        let (Ok(pose), true) = (pose, stamp.is_finite()) else {
             let expected = "a finite stamp and a quaternion of length 1";
             return Err(invalid(file, None, format!("line {n}"), shortened(line), expected));
-        }
-        poses.push((stamp, given.then(|| Pose::from_quaternion(t, q))));
+        };
+        poses.push((stamp, pose));
     }
     Ok(poses)
 }
