@@ -1,7 +1,7 @@
 //! What is done with a recording of any layout.
 use crate::bundle::Bundle;
 use mte_slam_dataset::{
-    Axes, ClassList, GivenCamera, LabelSource, Layout, OpenOptions,
+    Axes, ClassList, FrameOrder, GivenCamera, LabelSource, Layout, OpenOptions,
     inspect::{InspectOptions, inspect},
     open,
 };
@@ -37,6 +37,9 @@ fn options(bytes: [u8; 4], layouts: &[Layout], bundle: &Bundle) -> OpenOptions {
         }),
         depth_scale: (given & 4 != 0).then_some(1000.0),
         axes: if given & 8 != 0 { Axes::OpenGl } else { Axes::OpenCv },
+        order: if given & 32 != 0 { FrameOrder::File } else { FrameOrder::Time },
+        strict: given & 128 != 0,
+        max_depth_m: (given & 64 != 0).then_some(2.5),
         features: if given & 16 != 0 { Some(folder()) } else { None },
         ..Default::default()
     }

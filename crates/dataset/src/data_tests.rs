@@ -134,3 +134,83 @@ fn cabinet() {
     assert!((s.time_s(0) - 1341841278.8427).abs() < 1e-6);
     assert!((s.truth(0).unwrap().translation.x + 2.5508).abs() < 1e-9);
 }
+
+/// Opens one of the small recordings that show a kind of mistake.
+fn faulty(name: &str) -> Option<Box<dyn Sequence>> {
+    opened(&format!("faults/{name}"), 1.0)
+}
+
+#[test]
+fn hidden_and_shouted_names() {
+    for name in ["mac-images", "upper-images"] {
+        let Some(mut s) = faulty(name) else { return };
+        assert_eq!((s.info().layout, s.info().frames), ("images", 12), "{name}");
+        check_ends(s.as_mut(), false);
+        assert_eq!(s.warnings(), Vec::<String>::new(), "{name}");
+    }
+}
+
+#[test]
+fn an_archive_with_backslashes() {
+    let Some(folder) = data("faults/mac-images") else { return };
+    let archive = folder.0.parent().unwrap().join("backslash.zip");
+    let file = std::fs::File::open(&archive).unwrap();
+    let source = ZipSource::new("backslash.zip", file, 1 << 26).unwrap();
+    let mut s = open(Box::new(source), OpenOptions::default()).unwrap();
+    assert_eq!((s.info().layout, s.info().frames), ("images", 12));
+    check_ends(s.as_mut(), false);
+    assert_eq!(s.warnings(), Vec::<String>::new());
+}
+
+#[test]
+fn cameras_that_differ_by_little() {
+    let Some(mut s) = faulty("polycam-perframe") else { return };
+    assert_eq!((s.info().layout, s.info().frames), ("nerfstudio", 12));
+    check_ends(s.as_mut(), false);
+    let said = s.warnings().join(";");
+    assert!(said.contains("pixels: the median is taken for all"), "{said}");
+}
+
+#[test]
+fn stamps_that_are_none_or_of_another_unit() {
+    let Some(s) = faulty("durations") else { return };
+    let said = s.warnings().join("\n");
+    assert!(said.contains("rgb.txt: of 12 time stamps") && said.contains("durations"), "{said}");
+    assert!(said.contains("--order file"), "{said}");
+    let in_order = |name: &str| {
+        let options = OpenOptions { order: FrameOrder::File, ..Default::default() };
+        open(Box::new(data(&format!("faults/{name}")).unwrap()), options).unwrap()
+    };
+    let mut ordered = in_order("durations");
+    check_ends(ordered.as_mut(), false);
+    assert!((ordered.time_s(0) - 1305031453.359684).abs() < 1e-6);
+    assert!((ordered.truth(2).unwrap().translation.x + 0.780561).abs() < 1e-6);
+
+    let Some(s) = faulty("ms-truth") else { return };
+    let said = s.warnings().join("\n");
+    let part = "12 poses, none within 0.02 s of a colour image; they would fit in milliseconds";
+    assert!(said.contains(part), "{said}");
+    check_ends(in_order("ms-truth").as_mut(), false);
+}
+
+#[test]
+fn depth_too_near_and_too_far() {
+    let inspected = |name: &str| {
+        let mut s = faulty(name)?;
+        let opening = s.warnings().join("\n");
+        let found = inspect::inspect(s.as_mut(), Default::default(), |_, _| {}).unwrap();
+        Some((opening, found))
+    };
+    let Some((opening, found)) = inspected("mm-in-tum-notruth") else { return };
+    let parts = ["half of the depth is below", "nearer than rooms are", "--depth-scale 1000"];
+    assert!(parts.iter().all(|p| opening.contains(p)), "{opening}");
+    let warned = |r: &&inspect::Remark| r.severity == inspect::Severity::Warning;
+    let warnings: Vec<_> = found.remarks.iter().filter(warned).collect();
+    assert!(parts.iter().all(|p| warnings[0].text.contains(p)), "{warnings:?}");
+    for (name, range) in [("far5pct", 4.0..10.0), ("aims-2", 4.0..13.0)] {
+        let Some((_, found)) = inspected(name) else { return };
+        let said = format!("{name}: {:#?} {:#?}", found.depth, found.remarks);
+        assert!(found.depth.far.is_some_and(|far| range.contains(&far.limit_m)), "{said}");
+        assert!(found.remarks.iter().any(|r| r.text.contains("--max-depth")), "{said}");
+    }
+}

@@ -1,11 +1,14 @@
 //! What each layout boils down to: a list of frames with file names, and a camera.
 use super::{
-    folder::{Folder, invalid, parse_matrix, plural},
+    decode::Size,
+    folder::{Folder, invalid, plural},
+    frame_camera::{Fit, LEAST_PIXELS},
     intrinsics::Intrinsics,
+    pose_text::{lines, parse_line},
     stored::Stored,
 };
 use glam::DVec3;
-use mte_slam_types::{frame::Bounds, pose::Pose, sequence::SequenceError};
+use mte_slam_types::{camera::Camera, frame::Bounds, pose::Pose, sequence::SequenceError};
 use std::collections::BTreeMap;
 
 /// One frame before its images are decoded.
@@ -17,28 +20,44 @@ pub(super) struct Entry {
     pub depth: Stored,
     pub label: Option<String>,
     pub truth: Option<Pose>,
+    /// fx, fy, cx, cy of this frame where the frames' cameras differ \[pixels of the recording's
+    /// camera\].
+    pub focal_centre: Option<[f64; 4]>,
+    /// How images of this frame become those of the recording's camera, where they must.
+    pub fit: Option<Fit>,
 }
 
 impl Entry {
     /// A frame whose images are files of their own, and that has no time stamp.
     pub fn of_files(number: u64, color: String, depth: String, truth: Option<Pose>) -> Entry {
         let (color, depth) = (color.into(), depth.into());
-        Entry { number, time_s: number as f64, color, depth, label: None, truth }
+        Entry::stamped(number, number as f64, color, depth, truth)
+    }
+
+    /// A frame with a time stamp \[s\].
+    pub fn stamped(
+        number: u64,
+        time_s: f64,
+        color: Stored,
+        depth: Stored,
+        truth: Option<Pose>,
+    ) -> Entry {
+        let (label, focal_centre, fit) = (None, None, None);
+        Entry { number, time_s, color, depth, label, truth, focal_centre, fit }
     }
 }
 
-/// Returns the depth image that belongs to a colour image, or an error that says how it would be called.
+/// Returns the depth image that belongs to a number, or else the name that it would have: frames
+/// whose files are missing are left out by the reader, or refused.
 pub(super) fn depth_of(
     depths: &BTreeMap<u64, String>,
     number: u64,
-    color: &str,
     start: &str,
-) -> Result<String, SequenceError> {
-    let example = depths.values().next().map_or(start, String::as_str);
-    depths.get(&number).cloned().ok_or_else(|| SequenceError::Read {
-        file: format!("{start}{number}.png"),
-        reason: format!("missing: {color} has no depth image (they look like {example})"),
-    })
+    end: &str,
+) -> String {
+    let digits = |name: &String| name.len() - start.len() - end.len();
+    let width = depths.values().next().map_or(1, digits);
+    depths.get(&number).cloned().unwrap_or_else(|| format!("{start}{number:0width$}{end}"))
 }
 
 /// A recording before its images are decoded.
@@ -46,7 +65,7 @@ pub(super) struct Entries {
     pub frames: Vec<Entry>,
     pub intrinsics: Intrinsics,
     pub depth_unit_m: f64,
-    /// A depth value besides 0 that means "no measurement".
+    /// A depth value besides 0 that is known to mean "no measurement". 65535 does everywhere.
     pub invalid_depth: Option<u16>,
     pub bounds: Option<Bounds>,
     pub warnings: Vec<String>,
@@ -57,11 +76,12 @@ impl Entries {
     pub fn completed(
         mut self,
         folder: &Folder,
-        given: Option<Intrinsics>,
+        given: Option<&Intrinsics>,
     ) -> Result<Entries, SequenceError> {
         if let Some(given) = given {
             let depth_scale = self.intrinsics.depth_scale;
-            self.intrinsics = Intrinsics { depth_scale, ..given };
+            self.intrinsics = Intrinsics { depth_scale, ..given.clone() };
+            self.frames.iter_mut().for_each(|frame| frame.focal_centre = None);
         }
         if let Some(scale) = self.intrinsics.depth_scale {
             self.depth_unit_m = 1.0 / scale;
@@ -78,6 +98,41 @@ impl Entries {
     }
 }
 
+/// Decides which frames must be brought into the common camera, and says it.
+pub(super) fn fit_cameras(
+    frames: &mut [Entry],
+    intrinsics: &Intrinsics,
+    common: &Camera,
+    size: Size,
+    warnings: &mut Vec<String>,
+) -> Result<(), SequenceError> {
+    let (mut own, mut moved, mut farthest) = (0, 0, 0.0f64);
+    for frame in frames.iter_mut() {
+        let Some(focal_centre) = frame.focal_centre else { continue };
+        let camera = Intrinsics { focal_centre, ..intrinsics.clone() };
+        let fit = Fit::new(common, &camera.camera(&frame.depth.file, size)?);
+        let pixels = fit.farthest(size);
+        own += 1;
+        farthest = farthest.max(pixels);
+        if pixels >= LEAST_PIXELS {
+            moved += 1;
+            frame.fit = Some(fit);
+        }
+    }
+    if own > 0 && farthest > 0.0 {
+        let what = match moved {
+            0 => "the median is taken for all".into(),
+            n => format!("{} brought into the median camera", plural(n, "frame")),
+        };
+        let from = &intrinsics.from;
+        warnings.push(format!(
+            "{from}: the frames have cameras of their own, which differ from their median by up to \
+             {farthest:.2} pixels: {what}"
+        ));
+    }
+    Ok(())
+}
+
 /// Reads one pose per line. As many lines as images: line i belongs to the i-th image. More lines (when
 /// only some of the images were kept): line n belongs to image number n.
 pub(super) fn trajectory(
@@ -86,24 +141,26 @@ pub(super) fn trajectory(
     numbers: &[u64],
 ) -> Result<Vec<Option<Pose>>, SequenceError> {
     let text = folder.text(file)?;
-    let lines: Vec<&str> = text.lines().filter(|l| !l.trim().is_empty()).collect();
-    let by_number = lines.len() != numbers.len();
-    let fits = numbers.last().is_none_or(|&last| last < lines.len() as u64);
-    if by_number && !fits {
-        return Err(invalid(
+    let lines = lines(&text);
+    let places = places(lines.len(), numbers).ok_or_else(|| {
+        invalid(
             file,
             None,
             "poses",
             plural(lines.len(), "line"),
             format!("{}, one for each colour image", plural(numbers.len(), "line")),
-        ));
-    }
-    let line_of = |(i, &number): (usize, &u64)| if by_number { number as usize } else { i };
-    numbers
-        .iter()
-        .enumerate()
-        .map(|(i, number)| parse_matrix(file, Some(*number), lines[line_of((i, number))]))
-        .collect()
+        )
+    })?;
+    let poses = places.zip(numbers);
+    poses.map(|(place, number)| parse_line(file, Some(*number), lines[place])).collect()
+}
+
+/// Which of `poses` poses belongs to each image; `None` where they do not fit.
+pub(super) fn places(poses: usize, numbers: &[u64]) -> Option<impl Iterator<Item = usize>> {
+    let by_number = poses != numbers.len();
+    let fits = numbers.iter().all(|&number| number < poses as u64);
+    let place = move |(i, &number): (usize, &u64)| if by_number { number as usize } else { i };
+    (fits || !by_number).then(|| numbers.iter().enumerate().map(place))
 }
 
 /// `bound.json`: {"bound": [[x0, x1], [y0, y1], [z0, z1]]}.

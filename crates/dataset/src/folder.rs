@@ -1,8 +1,6 @@
 //! The files of a recording by name and by number, and the plain text among them.
-use mte_slam_types::{
-    pose::Pose,
-    sequence::{SequenceError, Source},
-};
+use super::names::Names;
+use mte_slam_types::sequence::{SequenceError, Source};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Shorthand for [`SequenceError::Invalid`].
@@ -29,40 +27,56 @@ const MAX_TEXT_BYTES: usize = 400 << 20;
 pub(super) const COLOR_ENDS: [&str; 3] = [".jpg", ".png", ".jpeg"];
 
 /// Files beside scenes that belong to all of them.
-const SHARED: [&str; 2] = ["cam_params.json", "scannetv2-labels.combined.tsv"];
+const SHARED: [&str; 5] = [
+    "cam_params.json",
+    "intrinsics.json",
+    "camera-intrinsics.txt",
+    "camera.txt",
+    "scannetv2-labels.combined.tsv",
+];
 
-/// A source with its list of names, seen from the folder in which the recording lies.
+/// A source with its list of names, seen from the folder in which the recording lies. Names are
+/// compared without case: those that it lists are in lower case, and others find theirs, too.
 pub(super) struct Folder {
     source: Box<dyn Source>,
-    /// Empty, or the folder of the recording inside the source, with a final `/`.
+    /// Empty, or the folder of the recording inside the source, with a final `/`, as the source
+    /// writes it.
     prefix: String,
-    all: BTreeSet<String>,
-    /// Names below `prefix`, without it.
+    all: Names,
+    /// Names below `prefix`, without it, in lower case.
     names: BTreeSet<String>,
 }
 
 impl Folder {
     /// Lists the source once.
     pub fn new(source: Box<dyn Source>) -> Result<Self, SequenceError> {
-        let all: BTreeSet<String> = source.list()?.into_iter().collect();
-        let names = all.iter().filter(|n| !n.starts_with("../")).cloned().collect();
+        let all = Names::new(source.list()?);
+        let names = all.folded().filter(|n| !n.starts_with("../")).map(String::from).collect();
         Ok(Self { source, prefix: String::new(), all, names })
+    }
+
+    /// Returns what people should know of the files, one sentence each.
+    pub fn notes(&self) -> Vec<String> {
+        self.source.notes().into_iter().chain(self.all.note()).collect()
     }
 
     /// When every file lies in one sub-folder (an unpacked archive often looks so), but for those
     /// that scenes share, go there. Returns whether it did.
     pub fn descend(&mut self) -> bool {
         let own = || self.names.iter().filter(|n| !SHARED.contains(&n.as_str()));
-        let Some((top, _)) = own().next().and_then(|n| n.split_once('/')) else {
+        let Some((first, (top, _))) = own().next().and_then(|n| Some((n, n.split_once('/')?)))
+        else {
             return false;
         };
         let top = format!("{top}/");
         if !own().all(|n| n.starts_with(&top)) {
             return false;
         }
+        let longer = self.prefix.len() + top.len();
+        let shown = self.all.find(&format!("{}{first}", self.prefix)).map(|n| n[..longer].into());
+        self.prefix = shown.unwrap_or_else(|| format!("{}{top}", self.prefix));
         self.names =
             self.names.iter().filter_map(|n| n.strip_prefix(&top)).map(String::from).collect();
-        self.prefix += &top;
         true
     }
 
@@ -74,14 +88,22 @@ impl Folder {
         }
     }
 
-    /// Returns the names of the files, sorted, relative to the recording's folder.
+    /// Returns the names of the files, sorted, in lower case, relative to the recording's folder.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.names.iter().map(String::as_str)
     }
 
-    /// Returns whether there is such a file.
+    /// Returns whether there is such a file, in any case.
     pub fn has(&self, name: &str) -> bool {
-        self.names.contains(name)
+        self.real(name).is_some()
+    }
+
+    /// Returns a file's name as it is really written, relative to the recording's folder.
+    pub fn real(&self, name: &str) -> Option<&str> {
+        // What lies above is found by `here_or_above` alone, whatever a list may ask for.
+        let inside = name.split('/').all(|part| !matches!(part, "" | "." | ".."));
+        let found = self.all.find(&format!("{}{name}", self.prefix)).filter(|_| inside)?;
+        found.get(self.prefix.len()..)
     }
 
     /// `name` here, or one or two folders up where the source lets us see it.
@@ -98,7 +120,7 @@ impl Folder {
             }
             let folder: String = inside.iter().map(|part| format!("{part}/")).collect();
             let above = format!("{outside}{folder}{name}");
-            if self.all.contains(&above) {
+            if let Some(above) = self.all.find(&above) {
                 // The '/' in front marks a name relative to the source, not to the recording.
                 return Some(format!("/{above}"));
             }
@@ -108,10 +130,10 @@ impl Folder {
 
     /// Returns the name that the source knows a file by.
     fn in_source(&self, name: &str) -> Result<String, SequenceError> {
-        match name.strip_prefix('/') {
-            Some(of_source) => Ok(of_source.into()),
-            None if self.has(name) => Ok(format!("{}{name}", self.prefix)),
-            None => Err(SequenceError::Read {
+        match (name.strip_prefix('/'), self.real(name)) {
+            (Some(of_source), _) => Ok(of_source.into()),
+            (None, Some(real)) => Ok(format!("{}{real}", self.prefix)),
+            (None, None) => Err(SequenceError::Read {
                 file: name.into(),
                 reason: format!("no such file in {}", self.name()),
             }),
@@ -155,10 +177,15 @@ impl Folder {
         })
     }
 
-    /// Reads a JSON file.
+    /// Reads a JSON file. Numbers that are none, which Python writes as `NaN` and `Infinity`, become
+    /// texts: what needs a number there says so.
     pub fn json(&self, name: &str) -> Result<serde_json::Value, SequenceError> {
-        serde_json::from_str(&self.text(name)?)
-            .map_err(|e| invalid(name, None, "JSON", e.to_string(), "a JSON document"))
+        let text = self.text(name)?;
+        let parsed = serde_json::from_str(&text);
+        parsed.or_else(|_| serde_json::from_str(&with_quoted_words(&text))).map_err(|e| {
+            let found = e.to_string();
+            invalid(name.trim_start_matches('/'), None, "JSON", found, "a JSON document")
+        })
     }
 
     /// Returns all files `START number END` for one of the ends, by number. Digits may or may not be
@@ -201,30 +228,35 @@ pub(super) fn number_between(name: &str, start: &str, end: &str) -> Option<u64> 
     digits.bytes().all(|b| b.is_ascii_digit()).then(|| digits.parse().ok()).flatten()
 }
 
-/// Returns a pose as 16 row-major numbers. `Ok(None)` when any of them is not finite, which is how data
-/// sets say "no pose".
-pub(super) fn parse_matrix(
-    file: &str,
-    frame: Option<u64>,
-    text: &str,
-) -> Result<Option<Pose>, SequenceError> {
-    let numbers = parse_numbers(file, frame, text)?;
-    let matrix: &[f64; 16] = numbers.as_slice().try_into().map_err(|_| {
-        invalid(file, frame, "pose", format!("{} numbers", numbers.len()), "16 numbers")
-    })?;
-    if matrix.iter().any(|x| !x.is_finite()) {
-        return Ok(None);
+/// Puts `NaN`, `Infinity` and `-Infinity` into quotes where they stand outside of texts.
+fn with_quoted_words(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(at) = rest.find(['"', 'N', 'I', '-']) {
+        out += &rest[..at];
+        rest = &rest[at..];
+        let end = if rest.starts_with('"') {
+            // To the end of the text; what is escaped does not end it.
+            let mut escaped = false;
+            let ends = |c: char| {
+                let end = c == '"' && !escaped;
+                escaped = c == '\\' && !escaped;
+                end
+            };
+            rest[1..].find(ends).map_or(rest.len(), |n| n + 2)
+        } else {
+            let word = ["NaN", "Infinity", "-Infinity"].iter().find(|w| rest.starts_with(**w));
+            if let Some(word) = word {
+                out += &format!("\"{word}\"");
+                rest = &rest[word.len()..];
+                continue;
+            }
+            1
+        };
+        out += &rest[..end];
+        rest = &rest[end..];
     }
-    match Pose::from_row_major(matrix) {
-        Some(pose) => Ok(Some(pose)),
-        None => Err(invalid(
-            file,
-            frame,
-            "pose",
-            "a matrix whose upper left 3x3 block is not a rotation",
-            "a rigid transform, world_from_camera",
-        )),
-    }
+    out + rest
 }
 
 /// Returns all numbers of a text, separated by white space.
@@ -288,6 +320,23 @@ mod tests {
         let got: Vec<_> = f.numbered("a_", &[".png"]).unwrap().into_iter().collect();
         assert_eq!(got, [(9, "a_9.png".into()), (10, "a_10.png".into())]);
         assert!(folder(&["a1.png", "a01.png"]).numbered("a", &[".png"]).is_err());
+    }
+
+    #[test]
+    fn numbers_that_are_none_are_texts_in_json() {
+        let json = |text: &str| {
+            let mut m = MemorySource::new("m");
+            m.insert("a.json", text);
+            Folder::new(Box::new(m)).unwrap().json("a.json")
+        };
+        let text =
+            r#"{"NaN": [NaN, -Infinity, Infinity, -1, 2], "a\\": "\"NaN, -Infinity", "I": 1}"#;
+        let got = json(text).unwrap();
+        assert_eq!(got["NaN"], serde_json::json!(["NaN", "-Infinity", "Infinity", -1, 2]));
+        assert_eq!((got["a\\"].as_str(), got["I"].as_i64()), (Some("\"NaN, -Infinity"), Some(1)));
+        for bad in ["{\"a", "{\"a\": Nan}", "[-]", "[NaN", "\"\\"] {
+            assert!(json(bad).unwrap_err().to_string().contains("a.json: JSON"), "{bad}");
+        }
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! Where a recording's camera comes from, and lens distortion.
 use super::{
     decode::Size,
-    folder::{Folder, invalid, parse_numbers},
+    folder::{Folder, base, invalid, parse_numbers},
+    names::folded,
     resize::{Resize, same_aspect},
 };
 use mte_slam_types::{camera::Camera, sequence::SequenceError};
@@ -109,24 +110,22 @@ impl Intrinsics {
 /// The camera of a plain folder of images.
 pub(super) const IMAGES_CAMERA: &str = "intrinsics.json";
 
-/// Reads the first of `cam_params.json` (here or up to two folders up), `intrinsics.json`,
-/// `camera-intrinsics.txt` and `camera.txt` that exists.
+/// Files with a camera; of several in one folder the first counts.
+const FILES: [&str; 4] = ["cam_params.json", IMAGES_CAMERA, "camera-intrinsics.txt", "camera.txt"];
+
+/// Reads the file with the camera: of the recording's folder, or else of the folders up to two up
+/// that the source lets us see.
 pub(super) fn read(folder: &Folder) -> Result<Option<Intrinsics>, SequenceError> {
-    if let Some(file) = folder.here_or_above("cam_params.json") {
-        return from_json(folder, &file).map(Some);
-    }
-    if folder.has(IMAGES_CAMERA) {
-        let found = from_json(folder, IMAGES_CAMERA)?;
-        return Ok(Some(Intrinsics { scales: true, ..found }));
-    }
-    let found = if folder.has("camera-intrinsics.txt") {
-        from_matrix(folder, "camera-intrinsics.txt")?
-    } else if folder.has("camera.txt") {
-        from_line(folder, "camera.txt")?
-    } else {
-        return Ok(None);
+    let here = FILES.into_iter().find(|f| folder.has(f)).map(String::from);
+    let above = || FILES.into_iter().find_map(|f| folder.here_or_above(f));
+    let Some(file) = here.or_else(above) else { return Ok(None) };
+    let found = match folded(base(&file)).as_str() {
+        "camera-intrinsics.txt" => from_matrix(folder, &file)?,
+        "camera.txt" => from_line(folder, &file)?,
+        IMAGES_CAMERA => Intrinsics { scales: true, ..from_json(folder, &file)? },
+        _ => from_json(folder, &file)?,
     };
-    Ok(Some(found))
+    Ok(Some(Intrinsics { from: file.trim_start_matches('/').into(), ..found }))
 }
 
 /// `{"camera": {"w", "h", "fx", "fy", "cx", "cy", "scale"}}`, plus `k1 k2 p1 p2 k3` if wanted.
@@ -178,7 +177,9 @@ fn from_json(folder: &Folder, file: &str) -> Result<Intrinsics, SequenceError> {
 
 /// Reads a 3x3 or 4x4 matrix.
 pub(super) fn from_matrix(folder: &Folder, file: &str) -> Result<Intrinsics, SequenceError> {
-    let numbers = parse_numbers(file, None, &folder.text(file)?)?;
+    let text = folder.text(file)?;
+    let file = file.trim_start_matches('/');
+    let numbers = parse_numbers(file, None, &text)?;
     let focal_centre = match *numbers.as_slice() {
         [fx, _, cx, _, fy, cy, _, _, _] => [fx, fy, cx, cy],
         [fx, _, cx, _, _, fy, cy, _, ..] if numbers.len() == 16 => [fx, fy, cx, cy],
@@ -194,6 +195,7 @@ pub(super) fn from_matrix(folder: &Folder, file: &str) -> Result<Intrinsics, Seq
 fn from_line(folder: &Folder, file: &str) -> Result<Intrinsics, SequenceError> {
     let expected = "fx fy cx cy, or fx fy cx cy k1 k2 p1 p2 k3";
     let text = folder.text(file)?;
+    let file = file.trim_start_matches('/');
     let plain: Vec<&str> = text.lines().map(|l| l.split('#').next().unwrap_or("")).collect();
     let numbers = parse_numbers(file, None, &plain.join("\n"))?;
     let (focal_centre, distortion) = match *numbers.as_slice() {

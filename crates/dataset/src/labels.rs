@@ -4,6 +4,7 @@ use super::{
     decode::{self, Origin, Size},
     entries::Entry,
     folder::{Folder, invalid, number_between, plural},
+    names::folded,
     resize::{Resize, same_aspect},
     scannet_ids::{self, RawIds},
 };
@@ -91,7 +92,7 @@ impl Labels {
                 }
                 let name = folder.name();
                 let last = name.trim_end_matches(['/', '\\']).rsplit(['/', '\\']).next();
-                is_raw |= last.is_some_and(|last| last.ends_with(RAW_FOLDER));
+                is_raw |= last.is_some_and(|last| folded(last).ends_with(RAW_FOLDER));
             }
         }
         let images = own.as_ref().unwrap_or(recording);
@@ -213,6 +214,18 @@ impl Labels {
     }
 }
 
+/// Says which files beside the frames look like label images and are none.
+pub(super) fn unreadable(folder: &Folder) -> Option<String> {
+    let is_jpeg = |n: &&str| n.ends_with(".jpg") || n.ends_with(".jpeg");
+    FOLDERS.into_iter().find_map(|below| {
+        let n = folder.names().filter(|n| n.starts_with(below)).filter(is_jpeg).count();
+        let images = plural(n, "JPEG image");
+        (n > 0).then(|| {
+            format!("{images} in {below} left out: labels are PNGs, for JPEG changes the ids")
+        })
+    })
+}
+
 /// Returns the ids of a label image in `size`, and its own size.
 fn decode(
     folder: &Folder,
@@ -312,8 +325,8 @@ fn assign(folder: &Folder, below: &str, frames: &mut [Entry]) -> Result<usize, S
     for frame in frames.iter_mut() {
         // The name of a file that holds all images says nothing of one.
         let whole = [&frame.color, &frame.depth].into_iter().filter(|s| s.part.is_none());
-        let same = whole.filter_map(|s| by_stem.get(stem(&s.file))).next();
-        frame.label = same.map(|n| (*n).into());
+        let same = whole.filter_map(|s| by_stem.get(stem(&folded(&s.file)))).next();
+        frame.label = same.and_then(|n| folder.real(n)).map(String::from);
         found += usize::from(same.is_some());
     }
     if found > 0 || families.is_empty() {
@@ -332,7 +345,8 @@ fn assign(folder: &Folder, below: &str, frames: &mut [Entry]) -> Result<usize, S
         ));
     };
     for frame in frames.iter_mut() {
-        frame.label = family.get(&frame.number).map(|n| (*n).into());
+        let label = family.get(&frame.number).and_then(|n| folder.real(n));
+        frame.label = label.map(String::from);
         found += usize::from(frame.label.is_some());
     }
     Ok(found)

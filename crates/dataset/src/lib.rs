@@ -7,10 +7,11 @@
 //!
 //! Files that any layout may hold beside its own:
 //! - the camera: `cam_params.json` (`{"camera": {w, h, fx, fy, cx, cy, scale}}`, `scale` in depth
-//!   units per metre, `k1 k2 p1 p2 k3` if there is distortion; also up to two folders up),
+//!   units per metre, `k1 k2 p1 p2 k3` if there is distortion),
 //!   `intrinsics.json` (the inner object alone, `depth_scale` for `scale`; it marks the layout
 //!   `images`, and fits images of its proportions in another size), `camera-intrinsics.txt` (a
-//!   3x3 or 4x4 matrix) or `camera.txt` (`fx fy cx cy [k1 k2 p1 p2 k3]`);
+//!   3x3 or 4x4 matrix) or `camera.txt` (`fx fy cx cy [k1 k2 p1 p2 k3]`), each also up to
+//!   two folders up;
 //! - feature maps, in a folder of their own: `000000.npy` or `000000.safetensors` (the tensor
 //!   `features`, or the only one), ... by frame number, channels x height x width, float32 or
 //!   float16;
@@ -22,14 +23,20 @@
 //!
 //! Archives of any of them are read in place ([`ZipSource`]).
 //!
+//! Names are compared without case (`.JPG`, `Color/`), and hidden files (`.DS_Store`, the `._` files
+//! and `__MACOSX/` of macOS) do not count.
+//!
 //! Frames are in numeric order, and the world frame is the data set's own.
 extern crate alloc;
 
 mod class_list;
 mod decode;
+mod depth_probe;
+mod depth_range;
 mod entries;
 mod features;
 mod folder;
+mod frame_camera;
 #[cfg(fuzzing)]
 pub mod fuzzing;
 pub mod inspect;
@@ -37,6 +44,9 @@ mod intrinsics;
 mod labels;
 mod layouts;
 mod memory;
+mod names;
+mod order;
+mod pose_text;
 mod reader;
 mod resize;
 mod scannet_ids;
@@ -49,6 +59,7 @@ pub use class_list::ClassList;
 pub use decode::{MAX_PIXELS, MAX_SIDE};
 pub use layouts::Layout;
 pub use memory::MemorySource;
+pub use order::FrameOrder;
 pub use reader::{Axes, GivenCamera, LabelSource, OpenOptions, open};
 pub use write::{ColorFormat, RecordingWriter, ReplicaWriter, SensWriter, TumWriter, WriteError};
 pub use zip::ZipSource;

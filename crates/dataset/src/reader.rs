@@ -2,16 +2,19 @@
 use super::{
     class_list::ClassList,
     decode::Size,
-    entries::Entry,
+    depth_probe::{self, DepthCode, Known},
+    entries::{Entry, fit_cameras},
     features::FeatureFiles,
     folder::{Folder, invalid, plural},
+    frame_camera::Fit,
     intrinsics::{Intrinsics, Rectifier, checked},
-    labels::{LabelOptions, Labels},
-    layouts::Layout,
+    labels::{self, LabelOptions, Labels},
+    layouts::{Layout, Wanted},
+    order::FrameOrder,
     resize::{Resize, same_aspect},
 };
 use mte_slam_types::{
-    classes::ClassTable,
+    classes::{ClassTable, UNLABELLED},
     frame::{Frame, SequenceInfo},
     pose::Pose,
     sequence::{Sequence, SequenceError, Source},
@@ -96,9 +99,17 @@ pub struct OpenOptions {
     pub camera: Option<GivenCamera>,
     /// Units of depth per metre, instead of the layout's.
     pub depth_scale: Option<f64>,
+    /// Depth beyond this counts as not measured \[m\]. (65535, and what is found to be a sensor's
+    /// code for "nothing", always does.)
+    pub max_depth_m: Option<f64>,
     /// How the cameras of the ground-truth poses lie. Layouts with axes of their own (nerfstudio)
     /// are turned before; the default is right for them.
     pub axes: Axes,
+    /// In which order listed frames are taken.
+    pub order: FrameOrder,
+    /// Refuse a recording of which a frame lacks an image, where such frames are otherwise left out
+    /// and said.
+    pub strict: bool,
     /// First frame, counted from 0 in the recording's order.
     pub start: usize,
     /// One frame in this many is used; at least 1.
@@ -129,7 +140,10 @@ impl Default for OpenOptions {
             layout: None,
             camera: None,
             depth_scale: None,
+            max_depth_m: None,
             axes: Axes::default(),
+            order: FrameOrder::default(),
+            strict: false,
             start: 0,
             stride: 1,
             frames: None,
@@ -143,8 +157,8 @@ impl Default for OpenOptions {
     }
 }
 
-/// Opens a recording: lists the files, reads poses, camera and classes, and checks that every
-/// frame in use has its files. Images are decoded frame by frame later.
+/// Opens a recording: lists the files, reads poses, camera and classes, and leaves out
+/// the frames whose images are not there. Images are decoded frame by frame later.
 ///
 /// # Errors
 /// Any [`SequenceError`]: an unknown layout, missing files, a file that is not what it should be
@@ -169,6 +183,9 @@ pub fn open(
     if let Some(units) = options.depth_scale.filter(|s| !(s.is_finite() && *s > 0.0)) {
         return wrong("depth scale", units.to_string(), "units of depth per metre > 0");
     }
+    if let Some(limit) = options.max_depth_m.filter(|m| !(m.is_finite() && *m > 0.0)) {
+        return wrong("largest depth", limit.to_string(), "metres > 0");
+    }
     let given = match options.camera {
         None => None,
         Some(GivenCamera { focal_centre, distortion }) => {
@@ -177,8 +194,10 @@ pub fn open(
         }
     };
     let layout = Layout::detect(&mut folder, options.layout, given.is_some())?;
-    let mut all = layout.read(&folder, given)?;
-    let mut warnings = std::mem::take(&mut all.warnings);
+    let wanted = Wanted { camera: given, order: options.order, strict: options.strict };
+    let mut all = layout.read(&folder, &wanted)?;
+    let mut warnings = folder.notes();
+    warnings.append(&mut all.warnings);
     if let Some(units) = options.depth_scale {
         all.depth_unit_m = 1.0 / units;
     }
@@ -188,6 +207,13 @@ pub fn open(
         }
     }
 
+    // Messages show names as they are really written.
+    for stored in all.frames.iter_mut().flat_map(|f| [&mut f.color, &mut f.depth]) {
+        if let Some(real) = folder.real(&stored.file) {
+            stored.file = real.into();
+        }
+    }
+    leave_out_missing(&folder, &mut all.frames, options.strict, &mut warnings)?;
     let there = all.frames.len();
     let wanted = options.frames.unwrap_or(usize::MAX);
     let mut frames: Vec<Entry> =
@@ -197,15 +223,6 @@ pub fn open(
         let expected = format!("less than {there}, the number of frames");
         return Err(invalid(&folder.name(), None, "start", found, expected));
     };
-    for frame in &frames {
-        for file in [&frame.color.file, &frame.depth.file] {
-            if !folder.has(file) {
-                let number = frame.number;
-                let reason = format!("no such file in {} (frame {number})", folder.name());
-                return Err(SequenceError::Read { file: file.clone(), reason });
-            }
-        }
-    }
 
     let depth_size = first.depth.size(&folder, first.number, "depth image")?;
     let color_size = first.color.size(&folder, first.number, "colour image")?;
@@ -216,6 +233,15 @@ pub fn open(
         warnings.push(format!("colour of {w}x{h} fitted to the {to_w}x{to_h} of depth"));
     }
 
+    let known = Known {
+        unit_m: all.depth_unit_m,
+        unit_given: options.depth_scale.is_some(),
+        hole: all.invalid_depth,
+        max_m: options.max_depth_m,
+    };
+    let depth_code = depth_probe::probe(&folder, &frames, depth_size, &known, &mut warnings);
+
+    fit_cameras(&mut frames, &all.intrinsics, &camera, depth_size, &mut warnings)?;
     let color_to_depth = Resize::to_size(color_size, depth_size);
     let rectifier = if all.intrinsics.distortion == [0.0; 5] {
         None
@@ -246,11 +272,13 @@ pub fn open(
     let labels = match options.labels {
         LabelSource::None => None,
         LabelSource::Dataset => {
+            warnings.extend(labels::unreadable(&folder));
             Labels::open(&folder, None, &mut frames, depth_size, classes_wanted)?
         }
         LabelSource::Folder(source) => {
-            let own = Some(Folder::new(source)?);
-            Labels::open(&folder, own, &mut frames, depth_size, classes_wanted)?
+            let own = Folder::new(source)?;
+            warnings.extend(own.notes());
+            Labels::open(&folder, Some(own), &mut frames, depth_size, classes_wanted)?
         }
     };
     let bare = frames.iter().filter(|f| f.label.is_none()).count();
@@ -259,11 +287,18 @@ pub fn open(
     }
 
     let features = match options.features {
-        Some(source) => Some(FeatureFiles::open(Folder::new(source)?, &frames)?),
+        Some(source) => {
+            let own = Folder::new(source)?;
+            warnings.extend(own.notes());
+            Some(FeatureFiles::open(own, &frames)?)
+        }
         None => None,
     };
     if features.is_some() && rectifier.is_some() {
         warnings.push("feature maps are taken as they are, with lens distortion".into());
+    }
+    if features.is_some() && frames.iter().any(|f| f.fit.is_some()) {
+        warnings.push("feature maps are taken as they are, each of its frame's own camera".into());
     }
 
     let name = folder.name();
@@ -285,7 +320,7 @@ pub fn open(
         frames,
         depth_size,
         color_size,
-        invalid_depth: all.invalid_depth,
+        depth_code,
         color_to_depth,
         rectifier,
         resize,
@@ -293,6 +328,35 @@ pub fn open(
         features,
         warnings,
     }))
+}
+
+/// Takes out the frames whose images are not there, and says so; an error where it is to be strict,
+/// or where no frame is left.
+fn leave_out_missing(
+    folder: &Folder,
+    frames: &mut Vec<Entry>,
+    strict: bool,
+    warnings: &mut Vec<String>,
+) -> Result<(), SequenceError> {
+    let there = frames.len();
+    let mut first: Option<(String, u64, String)> = None;
+    frames.retain(|frame| {
+        let (color, depth) = (&frame.color.file, &frame.depth.file);
+        let missing = [(color, depth), (depth, color)].into_iter().find(|(f, _)| !folder.has(f));
+        if let (Some((file, other)), None) = (missing, &first) {
+            first = Some((file.clone(), frame.number, other.clone()));
+        }
+        missing.is_none()
+    });
+    let Some((file, number, other)) = first else { return Ok(()) };
+    if strict || frames.is_empty() {
+        let reason = format!("no such file in {} (frame {number}, beside {other})", folder.name());
+        return Err(SequenceError::Read { file, reason });
+    }
+    let left_out = plural(there - frames.len(), "frame");
+    warnings
+        .push(format!("{left_out} left out for missing images, the first {file} (frame {number})"));
+    Ok(())
 }
 
 /// Colour is stretched to the size of depth, which is right only when both show the same.
@@ -315,7 +379,7 @@ struct Reader {
     frames: Vec<Entry>,
     depth_size: Size,
     color_size: Size,
-    invalid_depth: Option<u16>,
+    depth_code: DepthCode,
     color_to_depth: Resize,
     rectifier: Option<Rectifier>,
     resize: Resize,
@@ -326,16 +390,22 @@ struct Reader {
 
 impl Reader {
     /// Returns depth or labels, from the size on disk to the size of the camera.
-    fn fit_nearest<T: Copy>(&self, mut image: Vec<T>) -> Vec<T> {
+    fn fit_nearest<T: Copy>(&self, mut image: Vec<T>, fit: Option<Fit>, hole: T) -> Vec<T> {
+        if let Some(fit) = fit {
+            image = fit.nearest(&image, self.depth_size, hole);
+        }
         if let Some(rectifier) = &self.rectifier {
             image = rectifier.nearest(&image);
         }
         if self.resize.is_identity() { image } else { self.resize.nearest(&image) }
     }
 
-    fn fit_color(&self, mut image: Vec<[u8; 3]>) -> Vec<[u8; 3]> {
+    fn fit_color(&self, mut image: Vec<[u8; 3]>, fit: Option<Fit>) -> Vec<[u8; 3]> {
         if !self.color_to_depth.is_identity() {
             image = self.color_to_depth.average(&image);
+        }
+        if let Some(fit) = fit {
+            image = fit.bilinear(&image, self.depth_size);
         }
         if let Some(rectifier) = &self.rectifier {
             image = rectifier.bilinear(&image);
@@ -356,14 +426,11 @@ impl Sequence for Reader {
             .ok_or(SequenceError::OutOfRange { index, frames: self.frames.len() })?
             .clone();
         let frame = entry.number;
-        let color = self.fit_color(entry.color.color(&self.folder, frame, self.color_size)?);
+        let color = entry.color.color(&self.folder, frame, self.color_size)?;
+        let color = self.fit_color(color, entry.fit);
         let mut depth = entry.depth.depth(&self.folder, frame, self.depth_size)?;
-        if let Some(marker) = self.invalid_depth {
-            for d in depth.iter_mut().filter(|d| **d == marker) {
-                *d = 0;
-            }
-        }
-        let depth = self.fit_nearest(depth);
+        self.depth_code.apply(&mut depth);
+        let depth = self.fit_nearest(depth, entry.fit, 0);
 
         let labels = self.labels(index)?;
         let features = self.features.as_ref().map(|f| f.read(frame)).transpose()?;
@@ -377,8 +444,9 @@ impl Sequence for Reader {
         let (Some(labels), Some(file)) = (&mut self.labels, &entry.label) else {
             return Ok(None);
         };
-        let image = labels.read(&self.folder, file, entry.number, self.depth_size)?;
-        Ok(Some(self.fit_nearest(image)))
+        let (fit, number) = (entry.fit, entry.number);
+        let image = labels.read(&self.folder, file, number, self.depth_size)?;
+        Ok(Some(self.fit_nearest(image, fit, UNLABELLED)))
     }
 
     fn truth(&self, index: usize) -> Option<Pose> {

@@ -1,9 +1,11 @@
 //! Recordings in a zip archive, read in place.
+use super::folder::{plural, shortened};
 use ::zip::{CompressionMethod, ZipArchive, result::ZipError};
 use flate2::read::DeflateDecoder;
 use mte_slam_types::sequence::{SequenceError, Source, too_short};
 use std::{
     cell::RefCell,
+    collections::{BTreeMap, btree_map::Entry},
     io::{self, Read, Seek, SeekFrom},
     rc::Rc,
 };
@@ -15,7 +17,9 @@ const MAX_FILES: usize = 2_000_000;
 /// stored one directly, of a deflated one by unpacking on from the part before.
 pub struct ZipSource<R> {
     name: String,
-    names: Vec<String>,
+    /// The files by name, `/`-separated below the root, and their numbers in the archive.
+    files: BTreeMap<String, usize>,
+    notes: Vec<String>,
     max_file_bytes: u64,
     reader: Shared<R>,
     archive: RefCell<ZipArchive<Shared<R>>>,
@@ -82,15 +86,39 @@ impl<R: Read + Seek> ZipSource<R> {
             let reason = format!("more than {MAX_FILES} files: not a recording");
             return Err(SequenceError::Read { file: name.into(), reason });
         }
-        let names = archive
-            .file_names()
-            .filter(|n| !n.ends_with('/') && is_inside(n))
-            // What macOS adds beside every file.
-            .filter(|n| !n.starts_with("__MACOSX/"))
-            .map(String::from)
-            .collect();
+        let (mut files, mut left_out) = (BTreeMap::new(), BTreeMap::new());
+        for (i, stored) in (0..archive.len()).filter_map(|i| Some((i, archive.name_for_index(i)?)))
+        {
+            if stored.ends_with(['/', '\\']) {
+                continue; // a folder
+            }
+            let why = match plain(stored) {
+                Err(why) => why,
+                Ok(file) => match files.entry(file) {
+                    Entry::Vacant(free) => {
+                        free.insert(i);
+                        continue;
+                    }
+                    Entry::Occupied(_) => "named like another but for their slashes",
+                },
+            };
+            left_out.entry(why).or_insert((0, stored)).0 += 1;
+        }
+        let notes = left_out.into_iter().map(|(why, (n, first))| {
+            let files = plural(n, "file");
+            format!("{files} of the archive left out, {why}: {}", shortened(first))
+        });
+        let notes = notes.collect();
         let (archive, stream) = (RefCell::new(archive), RefCell::new(None));
-        Ok(Self { name: name.into(), names, max_file_bytes, reader, archive, stream })
+        Ok(Self { name: name.into(), files, notes, max_file_bytes, reader, archive, stream })
+    }
+
+    /// Returns the number of a file in the archive.
+    fn number(&self, file: &str) -> Result<usize, SequenceError> {
+        self.files.get(file).copied().ok_or_else(|| {
+            let reason = format!("no such file in {}", self.name);
+            SequenceError::Read { file: file.into(), reason }
+        })
     }
 
     /// Returns a decoder of a deflated file, standing at `offset` or before.
@@ -106,9 +134,22 @@ impl<R: Read + Seek> ZipSource<R> {
     }
 }
 
-/// Returns whether a name stays below its folder.
-fn is_inside(name: &str) -> bool {
-    !name.contains(['\\', '\0']) && name.split('/').all(|p| !matches!(p, "" | "." | ".."))
+/// Returns the plain form of a name in an archive, or why it has none. Archives of Windows'
+/// PowerShell have `\` where others have `/`, and some of `tar` and `zip` begin with `./`.
+fn plain(stored: &str) -> Result<String, &'static str> {
+    let name = stored.replace('\\', "/");
+    let drive = name.as_bytes().get(1) == Some(&b':') && name.as_bytes()[0].is_ascii_alphabetic();
+    if name.starts_with('/') || drive {
+        return Err("with absolute paths");
+    }
+    let parts: Vec<&str> = name.split('/').filter(|part| !matches!(*part, "" | ".")).collect();
+    if parts.contains(&"..") {
+        return Err("outside its root (..)");
+    }
+    if parts.is_empty() || name.contains('\0') {
+        return Err("without a name that a file can have");
+    }
+    Ok(parts.join("/"))
 }
 
 fn invalid(file: &str, error: &ZipError) -> SequenceError {
@@ -127,13 +168,18 @@ impl<R: Read + Seek> Source for ZipSource<R> {
     }
 
     fn list(&self) -> Result<Vec<String>, SequenceError> {
-        Ok(self.names.clone())
+        Ok(self.files.keys().cloned().collect())
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
     }
 
     fn read(&self, file: &str) -> Result<Vec<u8>, SequenceError> {
         let failed = |reason: String| SequenceError::Read { file: file.into(), reason };
+        let number = self.number(file)?;
         let mut archive = self.archive.borrow_mut();
-        let entry = archive.by_name(file).map_err(|e| invalid(file, &e))?;
+        let entry = archive.by_index(number).map_err(|e| invalid(file, &e))?;
         let (size, packed) = (entry.size(), entry.compressed_size());
         if size > self.max_file_bytes {
             return Err(failed(format!("{size} bytes, expected at most {}", self.max_file_bytes)));
@@ -149,8 +195,9 @@ impl<R: Read + Seek> Source for ZipSource<R> {
     }
 
     fn size(&self, file: &str) -> Result<u64, SequenceError> {
+        let number = self.number(file)?;
         let mut archive = self.archive.borrow_mut();
-        let entry = archive.by_name(file).map_err(|e| invalid(file, &e))?;
+        let entry = archive.by_index(number).map_err(|e| invalid(file, &e))?;
         Ok(entry.size())
     }
 
@@ -158,8 +205,9 @@ impl<R: Read + Seek> Source for ZipSource<R> {
         let failed =
             |e: io::Error| SequenceError::Read { file: file.into(), reason: e.to_string() };
         let (size, method, place) = {
+            let number = self.number(file)?;
             let mut archive = self.archive.borrow_mut();
-            let entry = archive.by_name(file).map_err(|e| invalid(file, &e))?;
+            let entry = archive.by_index(number).map_err(|e| invalid(file, &e))?;
             if entry.encrypted() {
                 let reason = "has a password".into();
                 return Err(SequenceError::Read { file: file.into(), reason });
@@ -231,13 +279,11 @@ mod tests {
     fn files_and_parts_of_them_are_what_was_packed() {
         let data: Vec<u8> = (0..300_000u32).map(|i| (i.wrapping_mul(i) >> 7) as u8).collect();
         for method in [CompressionMethod::Stored, CompressionMethod::Deflated] {
-            let files: [(&str, &[u8]); 4] =
-                [("a/big.sens", &data), ("../out", b"x"), ("__MACOSX/a", b"x"), ("b.txt", b"hi")];
+            let files: [(&str, &[u8]); 3] =
+                [("a/big.sens", &data), ("../out", b"x"), ("b.txt", b"hi")];
             let source = open(archive(method, &files)).unwrap();
             assert_eq!(source.name(), "room");
-            let mut names = source.list().unwrap();
-            names.sort();
-            assert_eq!(names, ["a/big.sens", "b.txt"]);
+            assert_eq!(source.list().unwrap(), ["a/big.sens", "b.txt"]);
             assert_eq!(source.read("b.txt").unwrap(), b"hi");
             assert_eq!(source.size("a/big.sens").unwrap(), 300_000);
             // Forward, on, back, and to the very end, with another file in between.
@@ -249,8 +295,51 @@ mod tests {
             let e = source.read_range("a/big.sens", 299_991, 10).unwrap_err().to_string();
             assert!(e.contains("a/big.sens") && e.contains("300000 bytes long"), "{e}");
             assert!(source.read_range("a/big.sens", u64::MAX, 10).is_err());
-            assert!(source.read("../out").is_ok() || !names.contains(&"../out".into()));
+            assert!(source.read("../out").is_err());
         }
+    }
+
+    #[test]
+    fn names_of_other_programs_are_read_and_those_left_out_are_said() {
+        let files: [(&str, &[u8]); 9] = [
+            ("scan\\color\\0.png", b"color"),
+            ("./scan/depth/0.png", b"depth"),
+            ("scan//./traj.txt", b"poses"),
+            ("scan/traj.txt", b"others"),
+            ("/etc/passwd", b"x"),
+            ("C:\\scan\\0.png", b"x"),
+            ("..\\0.png", b"x"),
+            ("scan/../../0.png", b"x"),
+            ("scan\\empty\\", b""),
+        ];
+        let source = open(archive(CompressionMethod::Stored, &files)).unwrap();
+        let names = ["scan/color/0.png", "scan/depth/0.png", "scan/traj.txt"];
+        assert_eq!(source.list().unwrap(), names);
+        let bytes = names.map(|n| source.read(n).unwrap());
+        assert_eq!(bytes.each_ref().map(Vec::as_slice), [&b"color"[..], b"depth", b"poses"]);
+        assert_eq!(source.read_range(names[0], 1, 3).unwrap(), b"olo");
+        let notes = source.notes().join(";");
+        for part in [
+            "2 files of the archive left out, with absolute paths: \"/etc/passwd\"",
+            "2 files of the archive left out, outside its root (..): \"..\\\\0.png\"",
+            "1 file of the archive left out, named like another but for their slashes: \"scan/traj",
+        ] {
+            assert!(notes.contains(part), "{part} is not in {notes}");
+        }
+        assert!(open(archive(CompressionMethod::Stored, &files[..3])).unwrap().notes().is_empty());
+    }
+
+    #[test]
+    fn files_with_a_password_are_listed_and_refused_by_name() {
+        let mut bytes = archive(CompressionMethod::Stored, &[("traj.txt", b"0123456789abcdef")]);
+        // The flag of encryption, in the file's header and in the directory.
+        bytes[6] |= 1;
+        let directory = bytes.windows(4).position(|w| w == b"PK\x01\x02").unwrap();
+        bytes[directory + 8] |= 1;
+        let source = open(bytes).unwrap();
+        assert_eq!(source.list().unwrap(), ["traj.txt"]);
+        let e = source.read("traj.txt").unwrap_err().to_string();
+        assert!(e.contains("traj.txt") && e.to_lowercase().contains("password"), "{e}");
     }
 
     #[test]

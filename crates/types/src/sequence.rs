@@ -66,6 +66,11 @@ pub trait Source {
     fn name(&self) -> &str;
     /// Returns all file names below the root, `/`-separated, in no particular order.
     fn list(&self) -> Result<Vec<String>, SequenceError>;
+    /// Returns what people should know of the files, such as those that are left out of the
+    /// list and why; one sentence each.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
     /// Returns the bytes of one file.
     fn read(&self, file: &str) -> Result<Vec<u8>, SequenceError>;
     /// Returns the length of one file \[bytes\]. Reads all of it unless the source knows better.

@@ -1,10 +1,8 @@
 //! Whether depth and poses fit each other: the depth of a frame, moved into a later one by their
 //! true poses, must be the depth that is measured there. A wrong unit of depth, other axes or
 //! another meaning of the poses make it worse, and the right one better, so all usual ones are tried.
-use super::{
-    remark::Severity,
-    summary::{USUAL_UNITS, median},
-};
+use super::{remark::Severity, summary::median};
+use crate::depth_range::USUAL_UNITS;
 use glam::DQuat;
 use mte_slam_types::{
     camera::Camera,

@@ -4,10 +4,12 @@ mod agreement;
 mod remark;
 mod summary;
 
+pub use crate::depth_range::FarDepth;
 pub use agreement::{Agreement, PoseReading, Reading};
 pub use remark::{Remark, Severity};
 pub use summary::{ClassShare, DepthSummary, Gap, Jump, LabelSummary, OrderSummary, PoseSummary};
 
+use crate::depth_range::UNUSUAL_START;
 use mte_slam_types::{
     camera::Camera,
     sequence::{Sequence, SequenceError},
@@ -100,7 +102,9 @@ pub fn inspect(
     depth.remark(&info, agreement.is_some(), &mut add);
     poses.remark(&mut add);
     order.remark(&mut add);
-    for text in sequence.warnings() {
+    // More frames were looked at for the range here than at opening.
+    let of_range = |text: &String| text.starts_with(UNUSUAL_START);
+    for text in sequence.warnings().into_iter().filter(|text| !of_range(text)) {
         add(Severity::Note, text);
     }
     remarks.sort_by_key(|r| r.severity != Severity::Warning);

@@ -1,5 +1,6 @@
 //! Counts and ranges.
 use super::remark::Severity;
+use crate::depth_range::{FarDepth, Histogram, unusual};
 use mte_slam_types::{
     classes::UNLABELLED,
     frame::{Frame, SequenceInfo},
@@ -7,9 +8,6 @@ use mte_slam_types::{
 };
 use serde::Serialize;
 
-/// Units of depth per metre that are in use: millimetres, TUM, Replica, 0.1 mm, RealSense L515,
-/// KITTI.
-pub(super) const USUAL_UNITS: [f64; 6] = [1000.0, 5000.0, 6553.5, 10_000.0, 4000.0, 256.0];
 /// Gaps that are listed one by one.
 const LISTED: usize = 5;
 
@@ -58,6 +56,8 @@ pub struct DepthSummary {
     pub empty_frames: usize,
     /// Share of the measured pixels that have the largest value of their format.
     pub saturated: f64,
+    /// Depth that lies far beyond the rest, where some does.
+    pub far: Option<FarDepth>,
 }
 
 /// A step between two frames that is far larger than usual.
@@ -113,21 +113,21 @@ pub(super) struct Images {
     info: SequenceInfo,
     frames: usize,
     empty: usize,
-    depth: Vec<u64>,
+    depth: Histogram,
     labelled_frames: usize,
     classes: Vec<u64>,
 }
 
 impl Images {
     pub fn new(info: &SequenceInfo) -> Self {
-        let (depth, classes) = (vec![0; 1 << 16], vec![0; 256]);
+        let (depth, classes) = (Histogram::default(), vec![0; 256]);
         Self { info: info.clone(), frames: 0, empty: 0, depth, labelled_frames: 0, classes }
     }
 
     pub fn add(&mut self, frame: &Frame) {
         self.frames += 1;
         self.empty += usize::from(frame.depth.iter().all(|d| *d == 0));
-        frame.depth.iter().for_each(|d| self.depth[usize::from(*d)] += 1);
+        self.depth.add(&frame.depth);
         if let Some(labels) = &frame.labels {
             self.labelled_frames += 1;
             labels.iter().for_each(|l| self.classes[usize::from(*l)] += 1);
@@ -136,19 +136,9 @@ impl Images {
 
     pub fn finish(self) -> (DepthSummary, Option<LabelSummary>) {
         let unit = self.info.depth_unit_m;
-        let all: u64 = self.depth.iter().sum();
-        let measured = all - self.depth[0];
+        let (all, measured) = (self.depth.pixels(), self.depth.measured());
         let share = |n: u64, of: u64| if of > 0 { n as f64 / of as f64 } else { 0.0 };
-        // The value that a share of the measured pixels does not exceed.
-        let quantile = |q: f64| {
-            let wanted = (q * measured as f64).max(1.0);
-            let mut seen = 0;
-            let at = (1..1 << 16).find(|&d| {
-                seen += self.depth[d];
-                seen as f64 >= wanted
-            });
-            at.unwrap_or(0) as f64 * unit
-        };
+        let quantile = |q: f64| f64::from(self.depth.quantile(q)) * unit;
         let depth = DepthSummary {
             frames: self.frames,
             min_m: quantile(0.0),
@@ -156,9 +146,10 @@ impl Images {
             median_m: quantile(0.5),
             percentile_99_m: quantile(0.99),
             max_m: quantile(1.0),
-            holes: share(self.depth[0], all),
+            holes: share(self.depth.count(0), all),
             empty_frames: self.empty,
-            saturated: share(self.depth[65535], measured),
+            saturated: share(self.depth.count(u16::MAX), measured),
+            far: self.depth.far(unit),
         };
         if self.labelled_frames == 0 {
             return (depth, None);
@@ -195,19 +186,18 @@ impl DepthSummary {
     ) {
         let units = 1.0 / info.depth_unit_m;
         let (low, median) = (self.percentile_1_m, self.median_m);
-        if median > 0.0 && !(0.15..=15.0).contains(&median) {
-            let fits: Vec<String> = USUAL_UNITS
-                .into_iter()
-                .filter(|u| (0.5..=6.0).contains(&(median * units / u)))
-                .map(|u| format!("{:.2} m with --depth-scale {u}", median * units / u))
-                .collect();
-            let hint = if fits.is_empty() { "".into() } else { format!(": {}", fits.join(", ")) };
-            let severity = if measured_by_poses { Severity::Note } else { Severity::Warning };
+        if let Some(text) = unusual(median, info.depth_unit_m) {
+            add(if measured_by_poses { Severity::Note } else { Severity::Warning }, text);
+        }
+        if let Some(FarDepth { limit_m, share }) = self.far {
             let text = format!(
-                "half of the depth is below {median:.3} m at {units} units per metre, which no room \
-                 has{hint}"
+                "{:.1} % of the depth lies beyond {limit_m} m (up to {:.1} m), far from the rest, \
+                 half of which is below {median:.2} m: if it is noise, --max-depth {limit_m} leaves \
+                 it out",
+                100.0 * share,
+                self.max_m
             );
-            add(severity, text);
+            add(Severity::Note, text);
         }
         if self.saturated > 0.02 {
             let text = format!(

@@ -173,3 +173,40 @@ fn a_camera_of_larger_images_is_found() {
     let text: String = found.remarks.iter().map(|r| r.text.as_str()).collect();
     assert!(found.has_warnings() && text.contains("about 192x144"), "{:#?}", found.remarks);
 }
+
+#[test]
+fn depth_that_is_far_too_near_is_a_warning() {
+    let mut room = Spoiled::new(5);
+    room.frames.iter_mut().for_each(|f| f.truth = None);
+    // Millimetres of a smaller room, read as TUM's unit.
+    let ratio = 600.0 * room.info.depth_unit_m;
+    for d in room.frames.iter_mut().flat_map(|f| &mut f.depth) {
+        *d = (f64::from(*d) * ratio).round() as u16;
+    }
+    room.info.depth_unit_m = 1.0 / 5000.0;
+    let text = room.warning();
+    assert!(
+        text.contains("nearer than rooms are") && text.contains("--depth-scale 1000"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_limit_is_proposed_where_some_depth_is_far_from_the_rest() {
+    let mut room = Spoiled::new(10);
+    let units = 1.0 / room.info.depth_unit_m;
+    // One pixel in 25 at 20 to 60 m, in millimetres, as that is.
+    for frame in &mut room.frames {
+        for d in &mut frame.depth {
+            *d = (f64::from(*d) / units * 1000.0) as u16;
+        }
+        let noisy = frame.depth.iter_mut().step_by(25).enumerate();
+        noisy.for_each(|(i, d)| *d = 20_000 + (i * 37 % 400) as u16 * 100);
+    }
+    room.info.depth_unit_m = 1e-3;
+    let found = room.inspect();
+    let far = found.depth.far.unwrap();
+    assert!((0.03..0.06).contains(&far.share) && (4.0..20.0).contains(&far.limit_m), "{far:?}");
+    let said: String = found.remarks.iter().map(|r| r.text.as_str()).collect();
+    assert!(said.contains(&format!("--max-depth {}", far.limit_m)), "{said}");
+}

@@ -1,9 +1,13 @@
 //! A plain folder of colour and depth images whose camera is given.
-use super::interface::{LayoutFiles, Mark, Parts};
+use super::{
+    interface::{LayoutFiles, Mark, Parts},
+    wanted::Wanted,
+};
 use crate::{
-    entries::{Entries, Entry, trajectory},
-    folder::{COLOR_ENDS, Folder, base, invalid, last_number, numbers, parse_matrix, plural},
-    intrinsics::{self, IMAGES_CAMERA, Intrinsics},
+    entries::{Entries, Entry, places, trajectory},
+    folder::{COLOR_ENDS, Folder, base, invalid, last_number, numbers, plural},
+    intrinsics::IMAGES_CAMERA,
+    pose_text::{parse_log, parse_matrix},
 };
 use mte_slam_types::{pose::Pose, sequence::SequenceError};
 use std::collections::{BTreeMap, BTreeSet};
@@ -12,6 +16,8 @@ const COLOR_FOLDERS: [&str; 7] = ["color", "colour", "rgb", "image", "images", "
 const DEPTH_FOLDERS: [&str; 2] = ["depth", "depths"];
 const POSE_FOLDERS: [&str; 2] = ["pose", "poses"];
 const POSE_FILES: [&str; 4] = ["traj.txt", "traj_w_c.txt", "poses.txt", "trajectory.txt"];
+/// Names that other things have, too: what does not fit is said and left.
+const PERHAPS_POSES: [&str; 4] = ["trajectory.log", "traj.log", "pose.txt", "pose.log"];
 
 pub(super) struct Images;
 
@@ -25,13 +31,13 @@ impl LayoutFiles for Images {
             about: "",
             color: "`color/`, `rgb/` or `images/`",
             depth: "`depth/*.png`, mm unless the camera says",
-            poses: "`pose/0.txt`, `traj.txt`, `poses.txt`",
+            poses: "`pose/0.txt`, `traj.txt`, `poses.txt`, `trajectory.log`",
             labels: "`semantic_class/`",
         }
     }
 
     fn marks(&self, folder: &Folder, camera_given: bool) -> Vec<Mark> {
-        let camera = camera_given || folder.has(IMAGES_CAMERA);
+        let camera = camera_given || folder.here_or_above(IMAGES_CAMERA).is_some();
         vec![
             ("color|rgb|images/<name>.jpg|png", colors(folder).len()),
             ("depth/<name>.png", depths(folder).len()),
@@ -39,8 +45,8 @@ impl LayoutFiles for Images {
         ]
     }
 
-    fn read(&self, folder: &Folder, given: Option<&Intrinsics>) -> Result<Entries, SequenceError> {
-        read(folder, given.cloned())
+    fn read(&self, folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
+        read(folder, wanted)
     }
 
     /// Most recordings with a list or poses of their own are such folders, too.
@@ -79,9 +85,9 @@ fn listed<'a>(folder: &'a Folder, folders: &[&str], ends: &[&str]) -> Vec<&'a st
 }
 
 /// Reads everything but the images.
-fn read(folder: &Folder, given: Option<Intrinsics>) -> Result<Entries, SequenceError> {
+fn read(folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
     let mut warnings = Vec::new();
-    let pairs = paired(folder, &mut warnings)?;
+    let pairs = paired(folder, wanted.strict, &mut warnings)?;
     let distinct: BTreeSet<u64> = pairs.iter().filter_map(|(c, _)| last_number(c)).collect();
     let numbered = distinct.len() == pairs.len();
     let mut frames: Vec<Entry> = pairs
@@ -93,19 +99,14 @@ fn read(folder: &Folder, given: Option<Intrinsics>) -> Result<Entries, SequenceE
         })
         .collect();
     let numbers: Vec<u64> = frames.iter().map(|f| f.number).collect();
-    for (frame, truth) in frames.iter_mut().zip(poses(folder, &numbers)?) {
+    let poses = poses(folder, &numbers, &mut warnings)?;
+    for (frame, truth) in frames.iter_mut().zip(poses) {
         frame.truth = truth;
     }
-    let intrinsics = match (given, intrinsics::read(folder)?) {
-        (Some(given), read) => {
-            Intrinsics { depth_scale: read.and_then(|r| r.depth_scale), ..given }
-        }
-        (None, Some(read)) => read,
-        (None, None) => {
-            let expected = "intrinsics.json, or the numbers on the command line";
-            return Err(invalid(&folder.name(), None, "camera", "nothing", expected));
-        }
-    };
+    let intrinsics = wanted.camera_or(folder, || {
+        let expected = "intrinsics.json, or the numbers on the command line";
+        Err(invalid(&folder.name(), None, "camera", "nothing", expected))
+    })?;
     Ok(Entries {
         frames,
         intrinsics,
@@ -120,6 +121,7 @@ fn read(folder: &Folder, given: Option<Intrinsics>) -> Result<Entries, SequenceE
 /// both, in the same place of their orders.
 fn paired<'a>(
     folder: &'a Folder,
+    strict: bool,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<(&'a str, &'a str)>, SequenceError> {
     let (colors, depths) = (colors(folder), depths(folder));
@@ -133,6 +135,11 @@ fn paired<'a>(
     let distinct = by_color.len() == colors.len() && by_depth.len() == depths.len();
     if distinct && !pairs.is_empty() {
         let alone = colors.len() + depths.len() - 2 * pairs.len();
+        if alone > 0 && strict {
+            let found = format!("{} without its partner", plural(alone, "image"));
+            let expected = "colour and depth for each number";
+            return Err(invalid(&folder.name(), None, "images", found, expected));
+        }
         if alone > 0 {
             warnings.push(format!("{} without its partner left out", plural(alone, "image")));
         }
@@ -152,7 +159,11 @@ fn paired<'a>(
 }
 
 /// Reads one file per frame in `pose/`, or one line per frame.
-fn poses(folder: &Folder, frames: &[u64]) -> Result<Vec<Option<Pose>>, SequenceError> {
+fn poses(
+    folder: &Folder,
+    frames: &[u64],
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Option<Pose>>, SequenceError> {
     for below in POSE_FOLDERS {
         let files = folder.numbered(&format!("{below}/"), &[".txt"])?;
         if files.is_empty() {
@@ -164,8 +175,31 @@ fn poses(folder: &Folder, frames: &[u64]) -> Result<Vec<Option<Pose>>, SequenceE
         };
         return frames.iter().map(one).collect();
     }
-    match POSE_FILES.into_iter().find(|f| folder.has(f)) {
-        Some(file) => trajectory(folder, file, frames),
-        None => Ok(vec![None; frames.len()]),
+    if let Some(file) = POSE_FILES.into_iter().find(|f| folder.has(f)) {
+        return trajectory(folder, file, frames);
+    }
+    for file in PERHAPS_POSES.into_iter().filter(|f| folder.has(f)) {
+        let found = match file.ends_with(".log") {
+            true => log(folder, file, frames),
+            false => trajectory(folder, file, frames),
+        };
+        match found {
+            Ok(poses) => return Ok(poses),
+            Err(e) => warnings.push(format!("not taken as ground truth: {e}")),
+        }
+    }
+    Ok(vec![None; frames.len()])
+}
+
+/// A log of poses, as [`trajectory`] takes lines.
+fn log(folder: &Folder, file: &str, frames: &[u64]) -> Result<Vec<Option<Pose>>, SequenceError> {
+    let poses = parse_log(file, &folder.text(file)?)?;
+    match places(poses.len(), frames) {
+        Some(places) => Ok(places.map(|place| poses[place]).collect()),
+        None => {
+            let found = plural(poses.len(), "pose");
+            let expected = format!("{}, one for each colour image", frames.len());
+            Err(invalid(file, None, "poses", found, expected))
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! What a layout is to the code: the files by which it is recognised, and how they are read.
-use crate::{entries::Entries, folder::Folder, intrinsics::Intrinsics};
+use super::wanted::Wanted;
+use crate::{entries::Entries, folder::Folder};
 use mte_slam_types::sequence::SequenceError;
 
 /// A kind of file that marks a layout, as messages show it, and how many of them there are.
@@ -31,9 +32,8 @@ pub(crate) trait LayoutFiles: Sync {
     /// Messages show them to people whose recording fits no layout.
     fn marks(&self, folder: &Folder, camera_given: bool) -> Vec<Mark>;
 
-    /// Reads everything but the images: frames, camera and poses. `given` is the camera that
-    /// people gave, for layouts that have none of their own.
-    fn read(&self, folder: &Folder, given: Option<&Intrinsics>) -> Result<Entries, SequenceError>;
+    /// Reads everything but the images: frames, camera and poses.
+    fn read(&self, folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError>;
 
     /// Returns whether it is taken only when no other layout fits.
     fn is_last_resort(&self) -> bool {

@@ -11,12 +11,17 @@ mod replica_vmap;
 mod scannet;
 mod sens;
 mod seven_scenes;
+mod stamps;
 mod tum;
+#[cfg(test)]
+mod tum_tests;
+mod wanted;
 
-use crate::{entries::Entries, folder::Folder, intrinsics::Intrinsics};
+use crate::{entries::Entries, folder::Folder};
 use core::{fmt, str::FromStr};
 use interface::LayoutFiles;
 use mte_slam_types::sequence::SequenceError;
+pub(crate) use wanted::Wanted;
 
 /// Makes [`Layout`] of lines `Variant: Type, "documentation";`.
 macro_rules! registry {
@@ -81,12 +86,8 @@ impl Layout {
     }
 
     /// Reads everything but the images.
-    pub(super) fn read(
-        self,
-        folder: &Folder,
-        given: Option<Intrinsics>,
-    ) -> Result<Entries, SequenceError> {
-        self.files().read(folder, given.as_ref())?.completed(folder, given)
+    pub(super) fn read(self, folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
+        self.files().read(folder, wanted)?.completed(folder, wanted.camera.as_ref())
     }
 
     fn fits(self, folder: &Folder, camera_given: bool) -> bool {
@@ -136,6 +137,7 @@ impl Layout {
                     0 => "the folder is empty".into(),
                     _ => format!("of {files} files: {}", reports.join("; ")),
                 };
+                folder.notes().iter().for_each(|note| reason += &format!(" ({note})"));
             }
             if !folder.descend() {
                 return Err(SequenceError::UnknownLayout { folder: name, reason });

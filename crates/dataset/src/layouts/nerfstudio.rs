@@ -1,11 +1,17 @@
 //! nerfstudio's `transforms.json` with depth, also in the variants of Instant-NGP and NeRFCapture.
 //! Its cameras look along -z with y up (OpenGL), and its pixel (0, 0) has its centre at (1/2, 1/2);
 //! both become ours here.
-use super::interface::{LayoutFiles, Mark, Parts};
+use super::{
+    interface::{LayoutFiles, Mark, Parts},
+    wanted::Wanted,
+};
 use crate::{
     entries::{Entries, Entry},
     folder::{COLOR_ENDS, Folder, invalid, last_number, plural, shortened},
+    frame_camera,
     intrinsics::{Intrinsics, checked},
+    order::FrameOrder,
+    pose_text,
 };
 use mte_slam_types::{pose::Pose, sequence::SequenceError};
 use serde_json::Value;
@@ -18,8 +24,6 @@ const DEPTH_UNIT_M: f64 = 1e-3;
 /// The camera models that are a pinhole with (or without) the distortion that we know.
 const MODELS: [&str; 6] =
     ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE", "SIMPLE_RADIAL", "RADIAL"];
-/// What belongs to a camera, at the top or in every frame.
-const CAMERA_KEYS: [&str; 6] = ["fl_x", "fl_y", "cx", "cy", "w", "h"];
 
 pub(super) struct Nerfstudio;
 
@@ -42,13 +46,13 @@ impl LayoutFiles for Nerfstudio {
         vec![(FILE, folder.has(FILE).into())]
     }
 
-    fn read(&self, folder: &Folder, _given: Option<&Intrinsics>) -> Result<Entries, SequenceError> {
-        read(folder)
+    fn read(&self, folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
+        read(folder, wanted)
     }
 }
 
 /// Reads everything but the images.
-fn read(folder: &Folder) -> Result<Entries, SequenceError> {
+fn read(folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
     let mut warnings = Vec::new();
     let json = folder.json(FILE)?;
     let listed = json.get("frames").and_then(Value::as_array).ok_or_else(|| {
@@ -57,14 +61,7 @@ fn read(folder: &Folder) -> Result<Entries, SequenceError> {
     let first = listed
         .first()
         .ok_or_else(|| invalid(FILE, None, "frames", "an empty list", "at least one frame"))?;
-    let intrinsics = camera(&json, first)?;
-    for (i, frame) in listed.iter().enumerate() {
-        if let Some(key) = CAMERA_KEYS.iter().find(|k| frame.get(**k) != first.get(**k)) {
-            let found = frame.get(*key).map_or("nothing".into(), Value::to_string);
-            let expected = "one camera for all frames, as in the first";
-            return Err(invalid(FILE, Some(i as u64), *key, found, expected));
-        }
-    }
+    let mut intrinsics = camera(&json, first, 0)?;
 
     let mut frames = Vec::with_capacity(listed.len());
     let mut without_depth = 0;
@@ -75,16 +72,20 @@ fn read(folder: &Folder) -> Result<Entries, SequenceError> {
             invalid(FILE, Some(number), "file_path", "nothing", "the path of the colour image")
         })?;
         let Some(depth) = path("depth_file_path").or_else(|| path("depth_path")) else {
+            if wanted.strict {
+                let expected = "depth_file_path or depth_path";
+                return Err(invalid(FILE, Some(number), "depth", "nothing", expected));
+            }
             without_depth += 1;
             continue;
         };
-        let color = existing(folder, number, color)?;
-        let depth = existing(folder, number, depth)?;
+        let (color, depth) = (existing(folder, color), existing(folder, depth));
         let truth = match frame.get("transform_matrix") {
             None | Some(Value::Null) => None,
             Some(rows) => pose(number, rows)?,
         };
         let mut entry = Entry::of_files(number, color, depth, truth);
+        entry.focal_centre = Some(same_lens(&intrinsics, camera(&json, frame, number)?, number)?);
         entry.time_s = frame
             .get("timestamp")
             .and_then(Value::as_f64)
@@ -100,7 +101,9 @@ fn read(folder: &Folder) -> Result<Entries, SequenceError> {
     if without_depth > 0 {
         warnings.push(format!("{} without depth left out", plural(without_depth, "frame")));
     }
-    in_order(&mut frames, &mut warnings);
+    in_order(&mut frames, wanted.order, &mut warnings);
+    let cameras: Vec<[f64; 4]> = frames.iter().filter_map(|f| f.focal_centre).collect();
+    intrinsics.focal_centre = frame_camera::median(&cameras).unwrap_or(intrinsics.focal_centre);
 
     let unit = |key: &str| json.get(key).map(|v| (key.to_string(), v.as_f64(), v.to_string()));
     let depth_unit_m = match unit("integer_depth_scale").or(unit("depth_unit_scale_factor")) {
@@ -113,11 +116,14 @@ fn read(folder: &Folder) -> Result<Entries, SequenceError> {
     Ok(Entries { frames, intrinsics, depth_unit_m, invalid_depth: None, bounds: None, warnings })
 }
 
-/// Frames by the numbers in the names of their files, and stamped.
-fn in_order(frames: &mut [Entry], warnings: &mut Vec<String>) {
+/// Frames by the numbers in the names of their files (unless the order of the list is wanted), and
+/// stamped.
+fn in_order(frames: &mut [Entry], order: FrameOrder, warnings: &mut Vec<String>) {
     let numbers: Vec<Option<u64>> = frames.iter().map(|f| last_number(&f.color.file)).collect();
     let distinct: BTreeSet<u64> = numbers.iter().flatten().copied().collect();
-    if distinct.len() == frames.len() {
+    if order == FrameOrder::File {
+        frames.iter_mut().enumerate().for_each(|(i, frame)| frame.number = i as u64);
+    } else if distinct.len() == frames.len() {
         for (frame, number) in frames.iter_mut().zip(numbers) {
             frame.number = number.unwrap_or(frame.number);
         }
@@ -132,14 +138,37 @@ fn in_order(frames: &mut [Entry], warnings: &mut Vec<String>) {
     }
 }
 
-/// Returns the camera, of the colour images, from the top of the file or else from its first frame.
-fn camera(json: &Value, first: &Value) -> Result<Intrinsics, SequenceError> {
-    let get = |key: &str| json.get(key).or_else(|| first.get(key));
+/// Returns fx, fy, cx and cy of a frame's camera, which may be its own (phones focus), unlike size
+/// and distortion.
+fn same_lens(first: &Intrinsics, own: Intrinsics, frame: u64) -> Result<[f64; 4], SequenceError> {
+    let differs = |field: &str, found: String, expected: String| {
+        let expected = format!("{expected}, as in the first frame");
+        Err(invalid(FILE, Some(frame), field, found, expected))
+    };
+    if own.size != first.size {
+        let shown = |i: &Intrinsics| i.size.map_or(String::new(), |(w, h)| format!("{w}x{h}"));
+        return differs("w and h", shown(&own), shown(first));
+    }
+    if own.distortion != first.distortion {
+        let shown = |i: &Intrinsics| format!("{:?}", i.distortion);
+        return differs("k1 k2 p1 p2 k3", shown(&own), shown(first));
+    }
+    Ok(own.focal_centre)
+}
+
+/// Returns the camera, of the colour images, from the top of the file or else from a frame.
+fn camera(json: &Value, frame: &Value, number: u64) -> Result<Intrinsics, SequenceError> {
+    let get = |key: &str| json.get(key).or_else(|| frame.get(key));
+    let invalid = |file: &str, _: Option<u64>, field: &str, found: String, expected: &str| {
+        // What stands at the top is no frame's.
+        let of_frame = json.get(field).is_none().then_some(number);
+        invalid(file, of_frame, field, found, expected)
+    };
     if let Some(model) = get("camera_model").and_then(Value::as_str)
         && !MODELS.contains(&model)
     {
         let expected = format!("a pinhole: {}", MODELS.join(", "));
-        return Err(invalid(FILE, None, "camera_model", shortened(model), expected));
+        return Err(invalid(FILE, None, "camera_model", shortened(model), &expected));
     }
     let number = |key: &str| -> Result<Option<f64>, SequenceError> {
         match get(key) {
@@ -165,12 +194,13 @@ fn camera(json: &Value, first: &Value) -> Result<Intrinsics, SequenceError> {
         }
     };
     let fx = focal("fl_x", "camera_angle_x", w)?
-        .ok_or_else(|| invalid(FILE, None, "fl_x", "nothing", "fl_x or camera_angle_x"))?;
+        .ok_or_else(|| invalid(FILE, None, "fl_x", "nothing".into(), "fl_x or camera_angle_x"))?;
     let fy = focal("fl_y", "camera_angle_y", h)?.unwrap_or(fx);
     let centre = [number("cx")?.unwrap_or(0.5 * w), number("cy")?.unwrap_or(0.5 * h)];
     for key in ["k4", "k5", "k6"] {
         if number(key)?.is_some_and(|k| k != 0.0) {
-            return Err(invalid(FILE, None, key, "a number", "0: k1 k2 p1 p2 k3 are known here"));
+            let found = "a number".to_string();
+            return Err(invalid(FILE, None, key, found, "0: k1 k2 p1 p2 k3 are known here"));
         }
     }
     let mut distortion = [0.0; 5];
@@ -182,15 +212,14 @@ fn camera(json: &Value, first: &Value) -> Result<Intrinsics, SequenceError> {
     checked(FILE, Intrinsics { distortion, scales: true, ..camera })
 }
 
-/// The file that a path means: relative to the folder, perhaps without its ending.
-fn existing(folder: &Folder, frame: u64, path: &str) -> Result<String, SequenceError> {
+/// The file that a path means: relative to the folder, perhaps without its ending. Where there is
+/// none, the name that it would have.
+fn existing(folder: &Folder, path: &str) -> String {
     let name = path.replace('\\', "/");
     let name = name.trim_start_matches("./");
     let endings = [""].into_iter().chain(COLOR_ENDS);
-    endings.map(|end| format!("{name}{end}")).find(|n| folder.has(n)).ok_or_else(|| {
-        let reason = format!("no such file in {} ({FILE}, frame {frame})", folder.name());
-        SequenceError::Read { file: name.into(), reason }
-    })
+    let found = endings.map(|end| format!("{name}{end}")).find(|n| folder.has(n));
+    found.unwrap_or_else(|| name.into())
 }
 
 /// Rows of 4 numbers, 3 or 4 of them; camera axes turned from OpenGL's to ours.
@@ -207,10 +236,13 @@ fn pose(frame: u64, rows: &Value) -> Result<Option<Pose>, SequenceError> {
     let mut matrix = Pose::IDENTITY.to_row_major();
     for (y, row) in rows.iter().take(3).enumerate() {
         for (x, value) in row.iter().enumerate() {
-            // JSON has no infinities; what is no number means that there is no pose.
+            // What is no number means that there is no pose.
             let Some(number) = value.as_f64().filter(|n| n.is_finite()) else { return Ok(None) };
             matrix[4 * y + x] = number;
         }
+    }
+    if pose_text::is_none(&matrix) {
+        return Ok(None);
     }
     match Pose::from_row_major(&matrix) {
         Some(pose) => Ok(Some(pose.with_flipped_camera())),

@@ -1,10 +1,13 @@
 //! Replica in the render of NICE-SLAM. The other render, that of vMAP, differs in its names and in
 //! its unit of depth alone.
-use super::interface::{LayoutFiles, Mark, Parts};
+use super::{
+    interface::{LayoutFiles, Mark, Parts},
+    wanted::Wanted,
+};
 use crate::{
     entries::{Entries, Entry, depth_of, trajectory},
     folder::{COLOR_ENDS, Folder, plural},
-    intrinsics::{self, Intrinsics},
+    intrinsics::Intrinsics,
 };
 use mte_slam_types::sequence::SequenceError;
 use std::collections::BTreeMap;
@@ -33,10 +36,10 @@ impl LayoutFiles for Replica {
         ]
     }
 
-    fn read(&self, folder: &Folder, _given: Option<&Intrinsics>) -> Result<Entries, SequenceError> {
+    fn read(&self, folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
         let colors = folder.numbered("results/frame", &COLOR_ENDS)?;
         let depths = folder.numbered("results/depth", &[".png"])?;
-        read(folder, colors, depths, "results/depth", 1.0 / 6553.5)
+        read(folder, colors, depths, "results/depth", 1.0 / 6553.5, wanted)
     }
 }
 
@@ -47,6 +50,7 @@ pub(super) fn read(
     depths: BTreeMap<u64, String>,
     depth_start: &str,
     depth_unit_m: f64,
+    wanted: &Wanted,
 ) -> Result<Entries, SequenceError> {
     let mut warnings = Vec::new();
     let numbers: Vec<u64> = colors.keys().copied().collect();
@@ -60,19 +64,19 @@ pub(super) fn read(
     };
     let mut frames = Vec::with_capacity(numbers.len());
     for ((number, color), truth) in colors.into_iter().zip(poses) {
-        let depth = depth_of(&depths, number, &color, depth_start)?;
+        let depth = depth_of(&depths, number, depth_start, ".png");
         frames.push(Entry::of_files(number, color, depth, truth));
     }
-    let surplus = depths.len() - frames.len();
+    let surplus = depths.keys().filter(|n| numbers.binary_search(n).is_err()).count();
     if surplus > 0 {
         warnings
             .push(format!("{} without a colour image left out", plural(surplus, "depth image")));
     }
-    let intrinsics = intrinsics::read(folder)?.unwrap_or_else(|| {
+    let intrinsics = wanted.camera_or(folder, || {
         warnings.push("no cam_params.json: Replica's usual camera taken (1200x680, f 600)".into());
         let from = "Replica (there is no cam_params.json)";
-        Intrinsics::fixed(from, (1200, 680), [600.0, 600.0, 599.5, 339.5])
-    });
+        Ok(Intrinsics::fixed(from, (1200, 680), [600.0, 600.0, 599.5, 339.5]))
+    })?;
     let (invalid_depth, bounds) = (None, None);
     Ok(Entries { frames, intrinsics, depth_unit_m, invalid_depth, bounds, warnings })
 }

@@ -2,11 +2,11 @@
 use super::{
     interface::{LayoutFiles, Mark, Parts},
     replica,
+    wanted::Wanted,
 };
 use crate::{
     entries::Entries,
     folder::{COLOR_ENDS, Folder},
-    intrinsics::Intrinsics,
 };
 use mte_slam_types::sequence::SequenceError;
 
@@ -34,9 +34,9 @@ impl LayoutFiles for ReplicaVmap {
         ]
     }
 
-    fn read(&self, folder: &Folder, _given: Option<&Intrinsics>) -> Result<Entries, SequenceError> {
+    fn read(&self, folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
         let colors = folder.numbered("rgb/rgb_", &COLOR_ENDS)?;
         let depths = folder.numbered("depth/depth_", &[".png"])?;
-        replica::read(folder, colors, depths, "depth/depth_", 1e-3)
+        replica::read(folder, colors, depths, "depth/depth_", 1e-3, wanted)
     }
 }

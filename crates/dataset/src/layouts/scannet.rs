@@ -1,9 +1,13 @@
 //! ScanNet as its exporter leaves it.
-use super::interface::{LayoutFiles, Mark, Parts};
+use super::{
+    interface::{LayoutFiles, Mark, Parts},
+    wanted::Wanted,
+};
 use crate::{
     entries::{Entries, Entry, depth_of},
-    folder::{COLOR_ENDS, Folder, parse_matrix},
+    folder::{COLOR_ENDS, Folder},
     intrinsics::{self, Intrinsics},
+    pose_text::parse_matrix,
 };
 use mte_slam_types::sequence::SequenceError;
 
@@ -35,30 +39,28 @@ impl LayoutFiles for ScanNet {
         ]
     }
 
-    fn read(&self, folder: &Folder, _given: Option<&Intrinsics>) -> Result<Entries, SequenceError> {
-        read(folder)
+    fn read(&self, folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
+        read(folder, wanted)
     }
 }
 
 /// Reads everything but the images of `color/`, `depth/`, `pose/` and `intrinsic/`.
-fn read(folder: &Folder) -> Result<Entries, SequenceError> {
+fn read(folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
     let mut warnings = Vec::new();
     let colors = folder.numbered("color/", &COLOR_ENDS)?;
     let depths = folder.numbered("depth/", &[".png"])?;
     let poses = folder.numbered("pose/", &[".txt"])?;
     let mut frames = Vec::with_capacity(colors.len());
     for (number, color) in colors {
-        let depth = depth_of(&depths, number, &color, "depth/")?;
+        let depth = depth_of(&depths, number, "depth/", ".png");
         let truth = match poses.get(&number) {
             Some(file) => parse_matrix(file, Some(number), &folder.text(file)?)?,
             None => None,
         };
         frames.push(Entry::of_files(number, color, depth, truth));
     }
-    let intrinsics = match intrinsics::read(folder)? {
-        Some(from_file) => from_file,
-        None => exported_camera(folder, &frames, &mut warnings)?,
-    };
+    let intrinsics =
+        wanted.camera_or(folder, || exported_camera(folder, &frames, &mut warnings))?;
     Ok(Entries {
         frames,
         intrinsics,

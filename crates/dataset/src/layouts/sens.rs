@@ -1,11 +1,15 @@
 //! ScanNet's packed recordings (`.sens`, version 4). Only the frames' headers are read at opening;
 //! images are read one by one later, so that memory does not grow with the file.
-use super::interface::{LayoutFiles, Mark, Parts};
+use super::{
+    interface::{LayoutFiles, Mark, Parts},
+    wanted::Wanted,
+};
 use crate::{
     decode::Origin,
     entries::{Entries, Entry},
     folder::{Folder, invalid},
     intrinsics::Intrinsics,
+    pose_text,
     stored::{Coding, Part, Stored},
 };
 use mte_slam_types::{pose::Pose, sequence::SequenceError};
@@ -40,14 +44,15 @@ impl LayoutFiles for Sens {
         vec![("<name>.sens", files_of(folder).len())]
     }
 
-    fn read(&self, folder: &Folder, _given: Option<&Intrinsics>) -> Result<Entries, SequenceError> {
+    fn read(&self, folder: &Folder, _wanted: &Wanted) -> Result<Entries, SequenceError> {
         read(folder)
     }
 }
 
 /// Returns the `.sens` files of a folder.
 fn files_of(folder: &Folder) -> Vec<&str> {
-    folder.names().filter(|n| n.ends_with(".sens") && !n.contains('/')).collect()
+    let packed = folder.names().filter(|n| n.ends_with(".sens") && !n.contains('/'));
+    packed.filter_map(|n| folder.real(n)).collect()
 }
 
 /// Reads a file piece by piece.
@@ -194,9 +199,9 @@ fn read(folder: &Folder) -> Result<Entries, SequenceError> {
         let matrix = fields.matrix();
         let (time_us, _depth_time) = (fields.u64(), fields.u64());
         let lengths = [fields.u64(), fields.u64()];
-        let truth = match matrix.iter().all(|x| x.is_finite()) {
-            false => None,
-            true => Some(Pose::from_row_major(&matrix).ok_or_else(|| {
+        let truth = match pose_text::is_none(&matrix) {
+            true => None,
+            false => Some(Pose::from_row_major(&matrix).ok_or_else(|| {
                 let found = "a matrix whose upper left 3x3 block is not a rotation";
                 cursor.error("pose", found, "a rigid transform, world_from_camera")
             })?),
@@ -216,7 +221,7 @@ fn read(folder: &Folder) -> Result<Entries, SequenceError> {
         let depth = part(lengths[1], depth_coding, depth_size, "depth image")?;
         let time_s = time_us as f64 * 1e-6;
         stamped &= frames.last().is_none_or(|last: &Entry| last.time_s < time_s);
-        frames.push(Entry { number, time_s, color, depth, label: None, truth });
+        frames.push(Entry::stamped(number, time_s, color, depth, truth));
     }
     if !stamped {
         warnings.push(format!("{file}: time stamps do not rise: frames are counted instead"));

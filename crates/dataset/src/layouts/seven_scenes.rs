@@ -1,9 +1,13 @@
 //! 7-Scenes: all files of a frame side by side.
-use super::interface::{LayoutFiles, Mark, Parts};
+use super::{
+    interface::{LayoutFiles, Mark, Parts},
+    wanted::Wanted,
+};
 use crate::{
-    entries::{Entries, Entry},
-    folder::{Folder, parse_matrix},
-    intrinsics::{self, Intrinsics},
+    entries::{Entries, Entry, depth_of},
+    folder::Folder,
+    intrinsics::Intrinsics,
+    pose_text::parse_matrix,
 };
 use mte_slam_types::sequence::SequenceError;
 
@@ -33,28 +37,25 @@ impl LayoutFiles for SevenScenes {
         ]
     }
 
-    fn read(&self, folder: &Folder, _given: Option<&Intrinsics>) -> Result<Entries, SequenceError> {
+    fn read(&self, folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
         let mut warnings = Vec::new();
         let colors = folder.numbered("frame-", &COLOR_ENDS)?;
         let depths = folder.numbered("frame-", &[".depth.png"])?;
         let poses = folder.numbered("frame-", &[".pose.txt"])?;
         let mut frames = Vec::with_capacity(colors.len());
         for (number, color) in colors {
-            let depth = depths.get(&number).cloned().ok_or_else(|| SequenceError::Read {
-                file: format!("frame-{number:06}.depth.png"),
-                reason: format!("missing: {color} has no depth image"),
-            })?;
+            let depth = depth_of(&depths, number, "frame-", ".depth.png");
             let truth = match poses.get(&number) {
                 Some(file) => parse_matrix(file, Some(number), &folder.text(file)?)?,
                 None => None,
             };
             frames.push(Entry::of_files(number, color, depth, truth));
         }
-        let intrinsics = intrinsics::read(folder)?.unwrap_or_else(|| {
+        let intrinsics = wanted.camera_or(folder, || {
             warnings.push("no camera-intrinsics.txt: f 585, centre 320 240 taken".into());
             let from = "7-Scenes (there is no camera-intrinsics.txt)";
-            Intrinsics::fixed(from, (640, 480), [585.0, 585.0, 320.0, 240.0])
-        });
+            Ok(Intrinsics::fixed(from, (640, 480), [585.0, 585.0, 320.0, 240.0]))
+        })?;
         Ok(Entries {
             frames,
             intrinsics,

@@ -1,15 +1,21 @@
 //! TUM RGB-D: lists of time-stamped files, associated by time.
-use super::interface::{LayoutFiles, Mark, Parts};
+use super::{
+    interface::{LayoutFiles, Mark, Parts},
+    stamps::{self, WINDOW_S, associate},
+    wanted::Wanted,
+};
 use crate::{
     entries::{Entries, Entry},
     folder::{Folder, invalid, parse_numbers, plural, shortened},
-    intrinsics::{self, Distortion, Intrinsics},
+    intrinsics::{Distortion, Intrinsics},
+    order::FrameOrder,
+    pose_text::of_quaternion,
 };
-use glam::{DQuat, DVec3};
 use mte_slam_types::{pose::Pose, sequence::SequenceError};
 
-/// Largest difference between stamps that belong together \[s\].
-const WINDOW_S: f64 = 0.02;
+const COLOR_LIST: &str = "rgb.txt";
+const DEPTH_LIST: &str = "depth.txt";
+const TRUTH: &str = "groundtruth.txt";
 
 /// The three cameras of the data set: name, fx fy cx cy, distortion.
 const CAMERAS: [(&str, [f64; 4], Distortion); 3] = [
@@ -36,61 +42,44 @@ impl LayoutFiles for Tum {
     }
 
     fn marks(&self, folder: &Folder, _camera_given: bool) -> Vec<Mark> {
-        ["rgb.txt", "depth.txt"].map(|file| (file, folder.has(file).into())).into()
+        [COLOR_LIST, DEPTH_LIST].map(|file| (file, folder.has(file).into())).into()
     }
 
-    fn read(&self, folder: &Folder, _given: Option<&Intrinsics>) -> Result<Entries, SequenceError> {
-        read(folder)
+    fn read(&self, folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
+        read(folder, wanted)
     }
 }
 
-/// Reads the lists and the ground truth.
-fn read(folder: &Folder) -> Result<Entries, SequenceError> {
-    let mut warnings = Vec::new();
-    let colors = file_list(folder, "rgb.txt", &mut warnings)?;
-    let depths = file_list(folder, "depth.txt", &mut warnings)?;
-    let truths = if folder.has("groundtruth.txt") {
-        ground_truth(folder, "groundtruth.txt")?
-    } else {
-        warnings.push("no groundtruth.txt".into());
-        Vec::new()
-    };
-    let color_times: Vec<f64> = colors.iter().map(|c| c.0).collect();
-    let depth_times: Vec<f64> = depths.iter().map(|d| d.0).collect();
-    let truth_times: Vec<f64> = truths.iter().map(|t| t.0).collect();
-    let depth_of = associate(&color_times, &depth_times);
-    let truth_of = associate(&color_times, &truth_times);
+/// Colour and depth of one moment.
+struct Moment {
+    time_s: f64,
+    color: String,
+    depth: String,
+}
 
-    let mut frames = Vec::new();
-    for (i, (time_s, color)) in colors.iter().enumerate() {
-        let Some(depth) = depth_of[i] else { continue };
-        frames.push(Entry {
-            number: frames.len() as u64,
-            time_s: *time_s,
-            color: color.clone().into(),
-            depth: depths[depth].1.clone().into(),
-            label: None,
-            truth: truth_of[i].and_then(|t| truths[t].1),
-        });
-    }
-    if frames.is_empty() {
-        return Err(invalid(
-            "rgb.txt",
-            None,
-            "time stamps",
-            format!("{} and {} but no pair", plural(colors.len(), "colour"), depths.len()),
-            format!("colour and depth within {WINDOW_S} s of each other"),
-        ));
-    }
-    let alone = colors.len() - frames.len();
-    if alone > 0 {
-        let images = plural(alone, "colour image");
-        warnings.push(format!("{images} without depth within {WINDOW_S} s left out"));
-    }
-    let intrinsics = match intrinsics::read(folder)? {
-        Some(from_file) => from_file,
-        None => known_camera(&folder.name(), &mut warnings),
+/// Reads the lists and the ground truth.
+fn read(folder: &Folder, wanted: &Wanted) -> Result<Entries, SequenceError> {
+    let mut warnings = Vec::new();
+    let colors = file_list(folder, COLOR_LIST)?;
+    let depths = file_list(folder, DEPTH_LIST)?;
+    let moments = match wanted.order {
+        FrameOrder::File => by_line(colors, depths, &mut warnings)?,
+        _ => by_time(colors, depths, &mut warnings)?,
     };
+    let times: Vec<f64> = moments.iter().map(|m| m.time_s).collect();
+    let truths = if folder.has(TRUTH) {
+        truths(ground_truth(folder, TRUTH)?, &times, wanted.order, &mut warnings)
+    } else {
+        warnings.push(format!("no {TRUTH}"));
+        vec![None; moments.len()]
+    };
+    let frames = moments.into_iter().zip(truths).enumerate();
+    let frames = frames.map(|(i, (m, truth))| {
+        Entry::stamped(i as u64, m.time_s, m.color.into(), m.depth.into(), truth)
+    });
+    let frames = frames.collect();
+    let intrinsics =
+        wanted.camera_or(folder, || Ok(known_camera(&folder.name(), &mut warnings)))?;
     Ok(Entries {
         frames,
         intrinsics,
@@ -99,6 +88,104 @@ fn read(folder: &Folder) -> Result<Entries, SequenceError> {
         bounds: None,
         warnings,
     })
+}
+
+type List = Vec<(f64, String)>;
+
+/// Pairs images by their stamps.
+fn by_time(
+    mut colors: List,
+    mut depths: List,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Moment>, SequenceError> {
+    for (list, files) in [(COLOR_LIST, &mut colors), (DEPTH_LIST, &mut depths)] {
+        warnings.extend(stamps::disorder(list, &times_of(files)));
+        files.sort_by(|a, b| a.0.total_cmp(&b.0));
+    }
+    let (listed, listed_depths) = (colors.len(), depths.len());
+    let partners = associate(&times_of(&colors), &times_of(&depths));
+    let pairs = colors.into_iter().zip(partners);
+    let moments: Vec<Moment> = pairs
+        .filter_map(|((time_s, color), depth)| {
+            let depth = std::mem::take(&mut depths[depth?].1);
+            Some(Moment { time_s, color, depth })
+        })
+        .collect();
+    if moments.is_empty() {
+        return Err(invalid(
+            COLOR_LIST,
+            None,
+            "time stamps",
+            format!("{} and {listed_depths} but no pair", plural(listed, "colour")),
+            format!("colour and depth within {WINDOW_S} s of each other (or --order file)"),
+        ));
+    }
+    let alone = listed - moments.len();
+    if alone > 0 {
+        let images = plural(alone, "colour image");
+        warnings.push(format!("{images} without depth within {WINDOW_S} s left out"));
+    }
+    Ok(moments)
+}
+
+/// Pairs images by the lines of the lists. Their times are the stamps of the list where these
+/// rise, or else those that the files are named by, or else the frames are counted.
+fn by_line(
+    colors: List,
+    depths: List,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Moment>, SequenceError> {
+    if colors.is_empty() || colors.len() != depths.len() {
+        let found = format!("{} in {COLOR_LIST}", plural(colors.len(), "image"));
+        let expected = format!("as many as in {DEPTH_LIST}, {}, and some", depths.len());
+        return Err(invalid(DEPTH_LIST, None, "lines, in the order of the file", found, expected));
+    }
+    let listed = times_of(&colors);
+    let named: Option<Vec<f64>> = colors.iter().map(|c| stamps::in_name(&c.1)).collect();
+    let (times, from) = match named {
+        _ if stamps::rise(&listed) => (listed, "the list's stamps"),
+        Some(named) if stamps::rise(&named) => (named, "the names of the images"),
+        _ => ((0..colors.len()).map(|i| i as f64).collect(), "counting"),
+    };
+    warnings.push(format!("frames in the order of the lists, their times by {from}"));
+    let pairs = times.into_iter().zip(colors).zip(depths);
+    Ok(pairs.map(|((time_s, (_, color)), (_, depth))| Moment { time_s, color, depth }).collect())
+}
+
+fn times_of<T>(list: &[(f64, T)]) -> Vec<f64> {
+    list.iter().map(|entry| entry.0).collect()
+}
+
+/// Returns the pose of each frame: the nearest in time, or where none fits and the order of the
+/// lines is wanted, that of its line.
+fn truths(
+    listed: Vec<(f64, Option<Pose>)>,
+    times: &[f64],
+    order: FrameOrder,
+    warnings: &mut Vec<String>,
+) -> Vec<Option<Pose>> {
+    let mut sorted = listed.clone();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let sorted_times = times_of(&sorted);
+    let partners = associate(times, &sorted_times);
+    if partners.iter().any(Option::is_some) || listed.is_empty() {
+        return partners.into_iter().map(|p| sorted[p?].1).collect();
+    }
+    let poses = plural(listed.len(), "pose");
+    let mut said = format!("{TRUTH}: {poses}, none within {WINDOW_S} s of a colour image");
+    if let Some(how) = stamps::explanation(times, &sorted_times) {
+        said += &format!("; they would fit {how}");
+    }
+    let as_many = listed.len() == times.len();
+    if as_many && order == FrameOrder::File {
+        warnings.push(said + "; taken line by line, for there are as many as frames");
+        return listed.into_iter().map(|(_, pose)| pose).collect();
+    }
+    if as_many {
+        said += "; there are as many as frames: --order file takes them line by line";
+    }
+    warnings.push(said);
+    vec![None; times.len()]
 }
 
 /// Returns the camera by the folder's name; the third, which has no distortion, when it says nothing.
@@ -130,12 +217,8 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
         .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
 }
 
-/// `stamp file` per line, sorted by stamp.
-fn file_list(
-    folder: &Folder,
-    list: &str,
-    warnings: &mut Vec<String>,
-) -> Result<Vec<(f64, String)>, SequenceError> {
+/// `stamp file` per line, in the order of the file.
+fn file_list(folder: &Folder, list: &str) -> Result<List, SequenceError> {
     let mut files = Vec::new();
     for (n, line) in lines(&folder.text(list)?) {
         let entry = line.split_once(char::is_whitespace).and_then(|(stamp, file)| {
@@ -147,14 +230,11 @@ fn file_list(
         })?;
         files.push(entry);
     }
-    if !files.is_sorted_by(|a, b| a.0 <= b.0) {
-        warnings.push(format!("{list} is not in the order of its time stamps: sorted"));
-    }
-    files.sort_by(|a, b| a.0.total_cmp(&b.0));
     Ok(files)
 }
 
-/// `stamp tx ty tz qx qy qz qw` per line, sorted by stamp; poses that are not finite are `None`.
+/// `stamp tx ty tz qx qy qz qw` per line, in the order of the file; poses that are not finite, or
+/// whose quaternion is 0, are `None`: so some programs say that they have none.
 fn ground_truth(folder: &Folder, file: &str) -> Result<Vec<(f64, Option<Pose>)>, SequenceError> {
     let mut poses = Vec::new();
     for (n, line) in lines(&folder.text(file)?) {
@@ -168,59 +248,19 @@ fn ground_truth(folder: &Folder, file: &str) -> Result<Vec<(f64, Option<Pose>)>,
                 "8: stamp tx ty tz qx qy qz qw",
             ));
         };
-        let (t, q) = (DVec3::new(x, y, z), DQuat::from_xyzw(qx, qy, qz, qw));
-        let finite = t.is_finite() && q.is_finite();
-        if !stamp.is_finite() || (finite && (q.length() - 1.0).abs() > 0.05) {
+        let pose = of_quaternion([x, y, z], [qx, qy, qz, qw]);
+        let (Ok(pose), true) = (pose, stamp.is_finite()) else {
             let expected = "a finite stamp and a quaternion of length 1";
             return Err(invalid(file, None, format!("line {n}"), shortened(line), expected));
-        }
-        poses.push((stamp, finite.then(|| Pose::from_quaternion(t, q))));
+        };
+        poses.push((stamp, pose));
     }
-    poses.sort_by(|a, b| a.0.total_cmp(&b.0));
     Ok(poses)
-}
-
-/// For each of `a` the index of its partner in `b` (both ascending): closest pairs first, each
-/// used once, none further apart than the window.
-fn associate(a: &[f64], b: &[f64]) -> Vec<Option<usize>> {
-    // Enough for any real rate, and a bound on the work for lists full of equal stamps.
-    const NEIGHBOURS: usize = 16;
-    let mut pairs = Vec::new();
-    for (i, &t) in a.iter().enumerate() {
-        let at = b.partition_point(|&s| s < t);
-        for j in at.saturating_sub(NEIGHBOURS)..(at + NEIGHBOURS).min(b.len()) {
-            let gap = (b[j] - t).abs();
-            // Stamps are large: allow for the last bits of their difference.
-            if gap <= WINDOW_S + 1e-6 {
-                pairs.push((gap, i, j));
-            }
-        }
-    }
-    pairs.sort_by(|p, q| p.0.total_cmp(&q.0).then(p.1.cmp(&q.1)).then(p.2.cmp(&q.2)));
-    let mut partner = vec![None; a.len()];
-    let mut taken = vec![false; b.len()];
-    for (_, i, j) in pairs {
-        if partner[i].is_none() && !taken[j] {
-            partner[i] = Some(j);
-            taken[j] = true;
-        }
-    }
-    partner
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn nearest_stamps_pair_up_once() {
-        let a = [1.0, 1.03, 1.06, 2.0, 3.0];
-        let b = [0.985, 1.022, 1.035, 2.03, 3.02];
-        assert_eq!(associate(&a, &b), [Some(0), Some(2), None, None, Some(4)]);
-        // Both want the same one; the closer wins and the other takes what is left.
-        assert_eq!(associate(&[1.0, 1.01], &[1.009, 1.02]), [Some(1), Some(0)]);
-        assert_eq!(associate(&[1.0], &[]), [None]);
-    }
 
     #[test]
     fn the_camera_is_known_by_the_folder() {
