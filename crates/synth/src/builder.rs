@@ -21,6 +21,8 @@ pub struct Builder {
     pub lights: Vec<Light>,
     origin: Vec3,
     turn: Mat3,
+    #[cfg(feature = "varied")]
+    degrees: f32,
 }
 
 /// Returns a linear colour from an sRGB one (with the gamma of 2 that the renderer uses).
@@ -53,6 +55,8 @@ impl Builder {
             lights: Vec::new(),
             origin: Vec3::ZERO,
             turn: Mat3::IDENTITY,
+            #[cfg(feature = "varied")]
+            degrees: 0.0,
         }
     }
 
@@ -60,6 +64,16 @@ impl Builder {
     pub fn place(&mut self, origin: [f32; 3], degrees: f32) {
         self.origin = Vec3::from(origin);
         self.turn = yaw(degrees);
+        #[cfg(feature = "varied")]
+        {
+            self.degrees = degrees;
+        }
+    }
+
+    /// Returns the current placement: where following solids stand, and their turn \[degrees\].
+    #[cfg(feature = "varied")]
+    pub fn placement(&self) -> (Vec3, f32) {
+        (self.origin, self.degrees)
     }
 
     /// Returns a position of the current placement in the world.
