@@ -112,7 +112,7 @@ def main():
     parser.add_argument("train")
     parser.add_argument("out")
     parser.add_argument("--validation")
-    parser.add_argument("--steps", type=int, default=12000)
+    parser.add_argument("--steps", type=int, default=5000)
     parser.add_argument("--batch", type=int, default=16)
     parser.add_argument("--rate", type=float, default=4e-3)
     parser.add_argument("--seed", type=int, default=1)
@@ -122,7 +122,7 @@ def main():
     torch.manual_seed(a.seed)
     torch.use_deterministic_algorithms(True, warn_only=True)
     rng = np.random.default_rng(a.seed)
-    names, raw_ids, _ = views.classes(a.train)
+    names, raw_ids, *_ = views.classes(a.train)
     color, label = views.load_all(a.train)
     share = np.bincount(label.ravel(), minlength=len(names)) / label.size
     weights = np.clip((1.0 / len(names) / np.maximum(share, 1e-6)) ** 0.25, 0.7, 2.0)

@@ -8,7 +8,8 @@
 //! Per scene NAME, in NumPy's format: `NAME.color.npy` (views, height, width, 3) sRGB,
 //! `NAME.label.npy` (views, height, width) compact classes, `NAME.depth.npy` (views, height,
 //! width) in units of `classes.json`'s `depth_unit_m`, `NAME.pose.npy` (views, 4, 4) camera to world,
-//! `NAME.camera.npy` (4) fx, fy, cx, cy. `classes.json` names the classes.
+//! `NAME.camera.npy` (4) fx, fy, cx, cy. `classes.json` names the classes and says whether views come
+//! in pairs.
 use mte_slam_synth::{
     SceneKind, SyntheticOptions, SyntheticSequence, VariedOptions, VariedSequence,
 };
@@ -104,15 +105,16 @@ fn write_scene(
     Ok(())
 }
 
-fn write_classes(out: &Path, scene: &dyn Sequence) -> std::io::Result<()> {
+fn write_classes(out: &Path, scene: &dyn Sequence, pairs: bool) -> std::io::Result<()> {
     let info = scene.info();
     let list =
         |f: &dyn Fn(usize) -> String| (0..info.classes.len()).map(f).collect::<Vec<_>>().join(", ");
     let names = list(&|i| format!("\"{}\"", info.classes.classes[i].name));
     let raw = list(&|i| info.classes.classes[i].raw_id.to_string());
     let unit = info.depth_unit_m;
-    let text =
-        format!("{{\"names\": [{names}], \"raw_ids\": [{raw}], \"depth_unit_m\": {unit}}}\n");
+    let text = format!(
+        "{{\"names\": [{names}], \"raw_ids\": [{raw}], \"depth_unit_m\": {unit}, \"pairs\": {pairs}}}\n"
+    );
     fs::write(out.join("classes.json"), text)
 }
 
@@ -130,14 +132,14 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
                 ..SyntheticOptions::default()
             };
             let mut scene = SyntheticSequence::new(options);
-            write_classes(out, &scene)?;
+            write_classes(out, &scene, arguments.pairs)?;
             write_scene(out, kind.name(), &mut scene, arguments)?;
         }
         Scenes::Varied(seeds) => {
             for seed in seeds.clone() {
                 let mut scene = VariedSequence::new(VariedOptions { width, height, seed });
                 if seed == seeds.start {
-                    write_classes(out, &scene)?;
+                    write_classes(out, &scene, arguments.pairs)?;
                 }
                 write_scene(out, &format!("varied-{seed:06}"), &mut scene, arguments)?;
             }
