@@ -21,7 +21,7 @@ const USAGE: &str =
 /// Frames of a built-in scene that views are spread over: about one round of its camera's path.
 const BUILT_IN_FRAMES: usize = 290;
 
-/// The wanted scenes.
+/// What to render: rooms of these seeds, or a built-in scene.
 enum Scenes {
     Varied(std::ops::Range<u64>),
     BuiltIn(SceneKind),
@@ -46,7 +46,8 @@ fn parse(arguments: &[String]) -> Option<Arguments> {
         "office" => Scenes::BuiltIn(SceneKind::Office),
         range => {
             let (first, end) = range.split_once("..")?;
-            Scenes::Varied(first.parse().ok()?..end.parse().ok()?)
+            let seeds = first.parse().ok()?..end.parse().ok()?;
+            (!seeds.is_empty()).then_some(Scenes::Varied(seeds))?
         }
     };
     let (width, height) = size.split_once('x')?;
