@@ -24,6 +24,8 @@ pub struct Builder {
     /// The thing that following solids are of, and the number of things so far.
     object: u32,
     objects: u32,
+    #[cfg(feature = "varied")]
+    degrees: f32,
 }
 
 /// Things that the shell of a room consists of: walls, floor and ceiling.
@@ -61,6 +63,8 @@ impl Builder {
             turn: Mat3::IDENTITY,
             object: 0,
             objects: 3,
+            #[cfg(feature = "varied")]
+            degrees: 0.0,
         }
     }
 
@@ -80,6 +84,16 @@ impl Builder {
     pub fn place(&mut self, origin: [f32; 3], degrees: f32) {
         self.origin = Vec3::from(origin);
         self.turn = yaw(degrees);
+        #[cfg(feature = "varied")]
+        {
+            self.degrees = degrees;
+        }
+    }
+
+    /// Returns the current placement: where following solids stand, and their turn \[degrees\].
+    #[cfg(feature = "varied")]
+    pub fn placement(&self) -> (Vec3, f32) {
+        (self.origin, self.degrees)
     }
 
     /// Returns a position of the current placement in the world.

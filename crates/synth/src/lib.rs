@@ -18,10 +18,14 @@ mod sequence;
 mod shape;
 mod texture;
 mod trajectory;
+#[cfg(feature = "varied")]
+mod varied;
 
 pub use mesh::SyntheticMesh;
 pub use options::{SceneKind, SyntheticOptions};
 pub use sequence::SyntheticSequence;
+#[cfg(feature = "varied")]
+pub use varied::{VariedOptions, VariedSequence};
 
 #[cfg(test)]
 mod tests;

@@ -44,8 +44,13 @@ impl Scene {
             SceneKind::Hall => rooms::hall::build(&mut b),
         };
         let path = Path::new(&waypoints, b.rng.next());
+        Scene::lit(b, shell, path, 0.50)
+    }
+
+    /// Puts a scene together and computes its light; `ambient` comes from everywhere.
+    pub fn lit(b: Builder, shell: Primitive, path: Path, ambient: f32) -> Scene {
         let bvh = PrimitiveBvh::new(&b.primitives);
-        let ambient = Vec3::splat(0.50);
+        let ambient = Vec3::splat(ambient);
         let light = LightMaps::bake(&shell, &b.primitives, &bvh, &b.lights, ambient);
         Scene { shell, primitives: b.primitives, path, materials: b.materials, bvh, light }
     }

@@ -2,7 +2,7 @@
 use super::{
     classes, mesh, mesh::SyntheticMesh, options::SyntheticOptions, render, scene::Scene, sensor,
 };
-use alloc::format;
+use alloc::{format, vec::Vec};
 use mte_slam_types::{
     camera::Camera,
     frame::{Bounds, Frame, SequenceInfo},
@@ -15,6 +15,31 @@ pub struct SyntheticSequence {
     options: SyntheticOptions,
     info: SequenceInfo,
     pub(super) scene: Scene,
+}
+
+/// Returns the time stamp of a frame at 30 frames per second \[s\].
+pub fn time_s(index: usize) -> f64 {
+    index as f64 / 30.0
+}
+
+fn to_frame(image: render::Image, depth: Vec<u16>, index: usize, pose: &Pose) -> Frame {
+    Frame {
+        features: None,
+        index,
+        number: index as u64,
+        time_s: time_s(index),
+        color: image.color,
+        depth,
+        labels: Some(image.labels),
+        truth: Some(*pose),
+    }
+}
+
+/// Renders a frame with exact depth.
+pub fn exact(scene: &Scene, camera: &Camera, index: usize, pose: &Pose) -> Frame {
+    let image = render::render(scene, camera, pose);
+    let depth = image.depth_m.iter().map(|&z| sensor::quantise(z)).collect();
+    to_frame(image, depth, index, pose)
 }
 
 impl SyntheticSequence {
@@ -53,22 +78,13 @@ impl SyntheticSequence {
     }
 
     fn render(&self, index: usize, pose: &Pose, noise: bool) -> Frame {
-        let image = render::render(&self.scene, &self.info.camera, pose);
-        let depth = if noise {
-            sensor::degrade(&image, &self.info.camera, self.options.seed, index)
-        } else {
-            image.depth_m.iter().map(|&z| sensor::quantise(z)).collect()
-        };
-        Frame {
-            features: None,
-            index,
-            number: index as u64,
-            time_s: self.time_s(index),
-            color: image.color,
-            depth,
-            labels: Some(image.labels),
-            truth: Some(*pose),
+        let camera = &self.info.camera;
+        if !noise {
+            return exact(&self.scene, camera, index, pose);
         }
+        let image = render::render(&self.scene, camera, pose);
+        let depth = sensor::degrade(&image, camera, self.options.seed, index);
+        to_frame(image, depth, index, pose)
     }
 
     /// Returns the scene's visible surfaces as triangles, with classes and colours.
@@ -102,6 +118,6 @@ impl Sequence for SyntheticSequence {
 
     /// 30 frames per second.
     fn time_s(&self, index: usize) -> f64 {
-        index as f64 / 30.0
+        time_s(index)
     }
 }

@@ -2,4 +2,8 @@
 #[cfg(feature = "hall")]
 pub mod hall;
 pub mod office;
+#[cfg(feature = "varied")]
+mod plan;
 pub mod room;
+#[cfg(feature = "varied")]
+pub mod varied;
