@@ -93,7 +93,8 @@ pub fn write_glb_by_class(mesh: &Mesh, classes: &ClassTable) -> Result<Vec<u8>, 
 }
 
 /// Returns parts of the mesh as nodes of one scene, each with a mesh of its own that holds the vertices
-/// it uses, with colours as [`write_glb`] has them. A node without triangles has no mesh.
+/// it uses, with colours as [`write_glb`] has them. A node without triangles has no mesh;
+/// where none has any, the scene is empty.
 ///
 /// # Errors
 /// As [`write_glb`], or a triangle that the mesh does not have, or a number that is not finite.

@@ -24,7 +24,8 @@ pub struct RoomAxes {
     /// Up (unit vector in the world).
     pub up: DVec3,
     /// Turn of `x` about `up` from the reference \[degrees\], in (-45, 45]. The reference is the
-    /// world axis farthest from `up` (the first of equals), brought into the horizontal plane.
+    /// world's x axis, or its y axis where `up` is within 37 degrees of x, brought into the
+    /// horizontal plane.
     pub yaw_deg: f64,
     /// Share of the upright surface that yaw was found from whose normals are within 5 degrees of
     /// an axis. Directions without any order give 0.11; near that, yaw means little. 0 where
@@ -130,12 +131,8 @@ fn unit(up: DVec3) -> Result<DVec3, ObjectsError> {
 /// Up, and the horizontal axes at yaw 0.
 fn reference(up: DVec3) -> Result<(DVec3, DVec3, DVec3), ObjectsError> {
     let up = unit(up)?;
-    let mut axis = DVec3::X;
-    for other in [DVec3::Y, DVec3::Z] {
-        if other.dot(up).abs() < axis.dot(up).abs() {
-            axis = other;
-        }
-    }
+    // Not the axis farthest from up: where up is nearly an axis, noise would choose among two.
+    let axis = if up.x.abs() < 0.8 { DVec3::X } else { DVec3::Y };
     let x = (axis - axis.dot(up) * up).normalize();
     Ok((up, x, up.cross(x)))
 }

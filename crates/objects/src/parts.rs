@@ -55,8 +55,14 @@ pub fn join(mesh: &Mesh, class: &[Option<u8>], gap_m: f64) -> Result<Sets, Objec
                 by_class[usize::from(*class)].push(t as u32);
             }
         }
+        // The class that a vertex was last sampled for; one that no class has to begin with.
+        let mut sampled = vec![u16::MAX; mesh.positions.len()];
         for (class, triangles) in by_class.iter().enumerate() {
-            let samples = samples(mesh, triangles, &mut sets, gap_m)
+            let mut first = |v: u32| {
+                let last = std::mem::replace(&mut sampled[v as usize], class as u16);
+                last != class as u16
+            };
+            let samples = samples(mesh, triangles, &mut sets, gap_m, &mut first)
                 .map_err(|found| too_many(class, found, gap_m))?;
             bridge(samples, &mut sets, gap_m);
         }
@@ -87,12 +93,14 @@ fn divisions(corners: &[DVec3; 3], spacing_m: f64) -> u64 {
     (longest / spacing_m).ceil().max(1.0) as u64
 }
 
-/// Samples of a class' surface, or how many there would be if that is too many.
+/// Samples of a class' surface, or how many there would be if that is too many. `first` says whether
+/// a vertex is met for the first time.
 fn samples(
     mesh: &Mesh,
     triangles: &[u32],
     sets: &mut Sets,
     gap_m: f64,
+    first: &mut dyn FnMut(u32) -> bool,
 ) -> Result<Vec<Sample>, u64> {
     let spacing_m = gap_m / SAMPLES_PER_GAP;
     let mut count = 0u64;
@@ -105,7 +113,6 @@ fn samples(
     if bound > MOST_SAMPLES {
         return Err(bound);
     }
-    let mut seen = std::collections::BTreeSet::new();
     let mut out = Vec::new();
     for &t in triangles {
         let corners = mesh.corners(t as usize);
@@ -120,7 +127,7 @@ fn samples(
                     (0, j) if j == n => Some(2),
                     _ => None,
                 };
-                if corner.is_some_and(|k: usize| !seen.insert(mesh.triangles[t as usize][k])) {
+                if corner.is_some_and(|k: usize| !first(mesh.triangles[t as usize][k])) {
                     continue;
                 }
                 let (u, v) = (i as f64 / n as f64, j as f64 / n as f64);

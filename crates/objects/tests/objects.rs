@@ -192,6 +192,13 @@ fn up_is_taken_from_cameras_and_leveled_by_the_floor() {
     let found = find(&mesh, &ObjectOptions { up: leveled, ..small() });
     let chair = found.objects.iter().find(|o| o.class == CHAIR).unwrap();
     assert!((chair.bounds.extent().z - 0.9).abs() < 0.01);
+    // Up that is an axis but for noise keeps the reference.
+    for (up, x) in [(DVec3::Z, DVec3::X), (-DVec3::Y, DVec3::X), (DVec3::X, DVec3::Y)] {
+        for noise in [DVec3::X, DVec3::Y, DVec3::Z] {
+            let axes = RoomAxes::from_yaw((up + 1e-3 * noise).normalize(), 0.0).unwrap();
+            assert!(axes.x.dot(x) > 0.999, "{up} {noise}: {axes:?}");
+        }
+    }
     assert_eq!(cameras_up([].into_iter()), None);
     assert_eq!(level_up(&Mesh::default(), DVec3::Y), Ok(DVec3::Y));
 }

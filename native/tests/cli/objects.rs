@@ -71,7 +71,7 @@ fn what_objects_cannot_be_made_of_is_said() {
         (&["--up", "1,2"], &["--up", "2 numbers"]),
         (&["--up=-1,nan,0"], &["--up", "direction"]),
         (&["--gap", "7"], &["--gap", "0.001 to 1"]),
-        (&["--min-area", "-1"], &["--min-area"]),
+        (&["--min-area=-1"], &["--min-area", "0 or more"]),
     ];
     for (arguments, parts) in usage {
         fail(f, &[&["objects", "demo"][..], arguments].concat(), 2, parts);
