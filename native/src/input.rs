@@ -11,7 +11,7 @@ use crate::{
     source::{self, has_ending},
 };
 use anyhow::{Error, Result};
-use mte_slam_dataset::{Axes, ClassList, LabelSource, Layout, OpenOptions};
+use mte_slam_dataset::{Axes, ClassList, FrameOrder, LabelSource, Layout, OpenOptions};
 use mte_slam_mesh::Mesh;
 use mte_slam_synth::{SyntheticMesh, SyntheticOptions, SyntheticSequence};
 use mte_slam_types::{
@@ -72,6 +72,8 @@ pub fn prepare(
         camera: selection.sensor.camera.map(|c| c.numbers()),
         depth_scale: selection.sensor.depth_scale,
         axes: selection.sensor.axes.clone(),
+        max_depth: selection.sensor.max_depth,
+        order: selection.sensor.order.clone(),
         labels: selection.labels.clone(),
         truth_labels: class_truth.name.clone(),
         features: selection.features.as_ref().map(|f| f.display().to_string()),
@@ -162,11 +164,23 @@ fn open_source(
             }
         },
     };
+    let order = match selection.sensor.order.as_deref() {
+        None => FrameOrder::default(),
+        Some(name) => match FrameOrder::named(name) {
+            Some(order) => order,
+            None => {
+                usage!("--order: found `{name}`, expected one of {}", FrameOrder::NAMES.join(", "))
+            }
+        },
+    };
     let options = OpenOptions {
         layout,
         camera: selection.sensor.camera,
         depth_scale: selection.sensor.depth_scale,
         axes,
+        order,
+        max_depth_m: selection.sensor.max_depth,
+        strict: selection.sensor.require_images,
         start: selection.start,
         stride: selection.stride,
         frames: selection.frames,

@@ -42,6 +42,12 @@ pub struct RunRecord {
     /// Axes of the true poses' cameras, if given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axes: Option<String>,
+    /// Depth beyond it counts as not measured, if given \[m\].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_depth: Option<f64>,
+    /// Order of listed frames, if given: `time` or `file`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub order: Option<String>,
     /// `none`, `dataset` or a folder.
     pub labels: String,
     /// Labels that classes were scored against: `none`, `dataset` or a folder.
@@ -133,6 +139,8 @@ impl Default for RunRecord {
             camera: None,
             depth_scale: None,
             axes: None,
+            max_depth: None,
+            order: None,
             labels: "dataset".to_owned(),
             truth_labels: "dataset".to_owned(),
             features: None,
@@ -162,6 +170,9 @@ impl RunRecord {
                 camera: self.camera.as_deref().and_then(GivenCamera::from_numbers),
                 depth_scale: self.depth_scale,
                 axes: self.axes.clone(),
+                max_depth: self.max_depth,
+                order: self.order.clone(),
+                require_images: false,
             },
             labels: self.labels.clone(),
             truth_labels: None,

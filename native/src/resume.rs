@@ -100,6 +100,8 @@ fn difference(
             ("camera", format!("{:?}", r.camera)),
             ("depth scale", format!("{:?}", r.depth_scale)),
             ("axes", format!("{:?}", r.axes)),
+            ("depth limit", format!("{:?}", r.max_depth)),
+            ("order", format!("{:?}", r.order)),
             ("feature maps", r.features.is_some().to_string()),
             ("unlabelled", format!("{:?}", r.unlabelled)),
             (

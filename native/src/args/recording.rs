@@ -72,6 +72,18 @@ pub struct SensorArgs {
     /// [default: opencv, x right, y down, z forward].
     #[arg(long, value_name = "opencv|opengl", help_heading = "Recording")]
     pub axes: Option<String>,
+    /// Depth beyond M metres counts as not measured; `inspect` proposes a limit where some depth lies
+    /// far beyond the rest [default: none].
+    #[arg(long, value_name = "M", value_parser = depth_limit, help_heading = "Recording")]
+    pub max_depth: Option<f64>,
+    /// Order of the frames of lists (TUM, nerfstudio): `time`, by their stamps, or `file`, as the lines
+    /// are, where stamps are no times [default: time].
+    #[arg(long, value_name = "time|file", help_heading = "Recording")]
+    pub order: Option<String>,
+    /// Refuse a recording of which a frame lacks an image; otherwise such frames are left out, with a
+    /// note.
+    #[arg(long, help_heading = "Recording")]
+    pub require_images: bool,
 }
 
 /// What the ids in label images mean.
@@ -126,6 +138,13 @@ pub struct ConvertArgs {
     /// Which part of the recording, and how it is read.
     #[command(flatten)]
     pub selection: SelectionArgs,
+}
+
+fn depth_limit(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(m) if m.is_finite() && m > 0.0 => Ok(m),
+        _ => Err("expected metres above 0, for example 8".to_owned()),
+    }
 }
 
 fn layout_help() -> String {
