@@ -69,6 +69,7 @@ pub fn renamed(n: usize, layout: Layout) -> MemorySource {
     let poses = String::from_utf8(from.get("traj.txt").unwrap().to_vec()).unwrap();
     let mut nerf_frames = Vec::new();
     let (mut rgb_list, mut depth_list, mut truth) = (String::new(), String::new(), String::new());
+    let mut odometry = String::from("timestamp, frame, x, y, z, qx, qy, qz, qw\n");
     for (i, line) in poses.lines().enumerate() {
         let color = from.get(&format!("results/frame{i:06}.png")).unwrap();
         let depth = from.get(&format!("results/depth{i:06}.png")).unwrap();
@@ -87,6 +88,7 @@ pub fn renamed(n: usize, layout: Layout) -> MemorySource {
                 to.insert(format!("pose/{i}.txt"), line);
                 (format!("color/{i}.png"), format!("depth/{i}.png"))
             }
+            Layout::Stray => (format!("rgb/{i:06}.png"), format!("depth/{i:06}.png")),
             Layout::Images => (format!("rgb/view{i}.png"), format!("depth/view{i}.png")),
             Layout::Nerfstudio => {
                 let turned = frame(i).truth.unwrap().with_flipped_camera().to_row_major();
@@ -108,6 +110,7 @@ pub fn renamed(n: usize, layout: Layout) -> MemorySource {
         let (t, q) = (pose.translation, pose.quaternion());
         let tq = [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(|x| x.to_string()).join(" ");
         truth += &format!("{:.4} {tq}\n", time - 0.003);
+        odometry += &format!("{time:.4}, {i:06}, {}\n", tq.replace(' ', ", "));
         to.insert(c, color);
         to.insert(d, depth);
         to.insert(format!("semantic_class/semantic_class_{i}.png"), label);
@@ -119,6 +122,10 @@ pub fn renamed(n: usize, layout: Layout) -> MemorySource {
             to.insert("groundtruth.txt", truth);
         }
         Layout::SevenScenes | Layout::ScanNet | Layout::Sens => {}
+        Layout::Stray => {
+            to.insert("odometry.csv", odometry);
+            to.insert("camera_matrix.csv", "20, 0, 11.5\n0, 21, 7.25\n0, 0, 1\n");
+        }
         Layout::ReplicaNice | Layout::ReplicaVmap => to.insert("traj.txt", poses),
         Layout::Images => {
             to.insert("poses.txt", poses);

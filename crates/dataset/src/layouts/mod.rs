@@ -12,6 +12,7 @@ mod scannet;
 mod sens;
 mod seven_scenes;
 mod stamps;
+mod stray;
 mod tum;
 #[cfg(test)]
 mod tum_tests;
@@ -54,6 +55,7 @@ registry! {
     ScanNet: scannet::ScanNet, "ScanNet, exported.";
     Sens: sens::Sens, "ScanNet, packed: one `.sens` file.";
     Nerfstudio: nerfstudio::Nerfstudio, "nerfstudio's `transforms.json`, with depth.";
+    Stray: stray::Stray, "Stray Scanner, with the frames of its film taken out.";
     Images: images::Images, "Any folders of images with a camera; taken when nothing else fits.";
 }
 

@@ -56,6 +56,7 @@ pub fn recording(layout: Layout) -> MemorySource {
                 other.insert(format!("pose/{i}.txt"), line);
                 (format!("color/{i}.jpg"), format!("depth/{i}.png"))
             }
+            Layout::Stray => (format!("rgb/{i:06}.jpg"), format!("depth/{i:06}.png")),
             _ => (format!("images/{i}.jpg"), format!("depth/{i}.png")),
         };
         let turned = pose.with_flipped_camera().to_row_major();
@@ -71,6 +72,18 @@ pub fn recording(layout: Layout) -> MemorySource {
     }
     let c = info.camera;
     match layout {
+        Layout::Stray => {
+            let camera = format!("{}, 0, {}\n0, {}, {}\n0, 0, 1\n", c.fx, c.cx, c.fy, c.cy);
+            other.insert("camera_matrix.csv", camera);
+            let mut table = String::from("timestamp, frame, x, y, z, qx, qy, qz, qw\n");
+            for (i, frame) in frames.iter().enumerate() {
+                let pose = frame.truth.unwrap();
+                let (t, q) = (pose.translation, pose.quaternion());
+                let numbers = [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(|x| x.to_string());
+                table += &format!("{}, {i:06}, {}\n", frame.time_s, numbers.join(", "));
+            }
+            other.insert("odometry.csv", table);
+        }
         Layout::ScanNet => {
             let depth = format!("{} 0 {} 0 0 {} {} 0 0 0 1 0 0 0 0 1", c.fx, c.cx, c.fy, c.cy);
             other.insert("intrinsic/intrinsic_depth.txt", depth);
