@@ -89,6 +89,17 @@ pub fn renamed(n: usize, layout: Layout) -> MemorySource {
                 (format!("color/{i}.png"), format!("depth/{i}.png"))
             }
             Layout::Stray => (format!("rgb/{i:06}.png"), format!("depth/{i:06}.png")),
+            Layout::Polycam => {
+                let (c, turned) = (info().camera, frame(i).truth.unwrap().with_flipped_camera());
+                let mut json = serde_json::json!({
+                    "fx": c.fx, "fy": c.fy, "cx": c.cx + 0.5, "cy": c.cy + 0.5,
+                });
+                for (k, x) in turned.to_row_major()[..12].iter().enumerate() {
+                    json[format!("t_{}{}", k / 4, k % 4)] = (*x).into();
+                }
+                to.insert(format!("keyframes/cameras/{i}.json"), json.to_string());
+                (format!("keyframes/images/{i}.png"), format!("keyframes/depth/{i}.png"))
+            }
             Layout::Images => (format!("rgb/view{i}.png"), format!("depth/view{i}.png")),
             Layout::Nerfstudio => {
                 let turned = frame(i).truth.unwrap().with_flipped_camera().to_row_major();
@@ -121,7 +132,7 @@ pub fn renamed(n: usize, layout: Layout) -> MemorySource {
             to.insert("depth.txt", format!("# depth\r\n{depth_list}"));
             to.insert("groundtruth.txt", truth);
         }
-        Layout::SevenScenes | Layout::ScanNet | Layout::Sens => {}
+        Layout::SevenScenes | Layout::ScanNet | Layout::Sens | Layout::Polycam => {}
         Layout::Stray => {
             to.insert("odometry.csv", odometry);
             to.insert("camera_matrix.csv", "20, 0, 11.5\n0, 21, 7.25\n0, 0, 1\n");

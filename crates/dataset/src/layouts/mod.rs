@@ -6,6 +6,7 @@
 mod images;
 mod interface;
 mod nerfstudio;
+mod polycam;
 mod replica;
 mod replica_vmap;
 mod scannet;
@@ -56,6 +57,7 @@ registry! {
     Sens: sens::Sens, "ScanNet, packed: one `.sens` file.";
     Nerfstudio: nerfstudio::Nerfstudio, "nerfstudio's `transforms.json`, with depth.";
     Stray: stray::Stray, "Stray Scanner, with the frames of its film taken out.";
+    Polycam: polycam::Polycam, "Polycam's raw export.";
     Images: images::Images, "Any folders of images with a camera; taken when nothing else fits.";
 }
 

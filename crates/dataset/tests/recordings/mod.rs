@@ -57,6 +57,16 @@ pub fn recording(layout: Layout) -> MemorySource {
                 (format!("color/{i}.jpg"), format!("depth/{i}.png"))
             }
             Layout::Stray => (format!("rgb/{i:06}.jpg"), format!("depth/{i:06}.png")),
+            Layout::Polycam => {
+                let c = info.camera;
+                let mut json =
+                    serde_json::json!({ "fx": c.fx, "fy": c.fy, "cx": c.cx, "cy": c.cy });
+                for (k, x) in pose.to_row_major()[..12].iter().enumerate() {
+                    json[format!("t_{}{}", k / 4, k % 4)] = (*x).into();
+                }
+                other.insert(format!("keyframes/cameras/{i}.json"), json.to_string());
+                (format!("keyframes/images/{i}.jpg"), format!("keyframes/depth/{i}.png"))
+            }
             _ => (format!("images/{i}.jpg"), format!("depth/{i}.png")),
         };
         let turned = pose.with_flipped_camera().to_row_major();
@@ -72,6 +82,7 @@ pub fn recording(layout: Layout) -> MemorySource {
     }
     let c = info.camera;
     match layout {
+        Layout::Polycam => {}
         Layout::Stray => {
             let camera = format!("{}, 0, {}\n0, {}, {}\n0, 0, 1\n", c.fx, c.cx, c.fy, c.cy);
             other.insert("camera_matrix.csv", camera);
