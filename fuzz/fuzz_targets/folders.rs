@@ -1,3 +1,4 @@
-//! Recordings whose files are numbered: Replica (two kinds), 7-Scenes, exported ScanNet, images.
+//! Recordings whose files are numbered: Replica (two kinds), 7-Scenes, exported ScanNet, Stray Scanner, Polycam,
+//! images.
 #![no_main]
-mte_slam_fuzz::fuzz_recordings!(ReplicaNice, ReplicaVmap, SevenScenes, ScanNet, Images);
+mte_slam_fuzz::fuzz_recordings!(ReplicaNice, ReplicaVmap, SevenScenes, ScanNet, Stray, Polycam, Images);

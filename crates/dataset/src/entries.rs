@@ -20,6 +20,8 @@ pub(super) struct Entry {
     pub depth: Stored,
     pub label: Option<String>,
     pub truth: Option<Pose>,
+    /// What the recording device took for the pose.
+    pub prior: Option<Pose>,
     /// fx, fy, cx, cy of this frame where the frames' cameras differ \[pixels of the recording's
     /// camera\].
     pub focal_centre: Option<[f64; 4]>,
@@ -42,8 +44,8 @@ impl Entry {
         depth: Stored,
         truth: Option<Pose>,
     ) -> Entry {
-        let (label, focal_centre, fit) = (None, None, None);
-        Entry { number, time_s, color, depth, label, truth, focal_centre, fit }
+        let (label, prior, focal_centre, fit) = (None, None, None, None);
+        Entry { number, time_s, color, depth, label, truth, prior, focal_centre, fit }
     }
 }
 

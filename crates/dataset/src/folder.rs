@@ -235,7 +235,7 @@ fn with_quoted_words(text: &str) -> String {
     while let Some(at) = rest.find(['"', 'N', 'I', '-']) {
         out += &rest[..at];
         rest = &rest[at..];
-        let end = if rest.starts_with('"') {
+        let end = if let Some(inside) = rest.strip_prefix('"') {
             // To the end of the text; what is escaped does not end it.
             let mut escaped = false;
             let ends = |c: char| {
@@ -243,7 +243,7 @@ fn with_quoted_words(text: &str) -> String {
                 escaped = c == '\\' && !escaped;
                 end
             };
-            rest[1..].find(ends).map_or(rest.len(), |n| n + 2)
+            inside.find(ends).map_or(rest.len(), |n| n + 2)
         } else {
             let word = ["NaN", "Infinity", "-Infinity"].iter().find(|w| rest.starts_with(**w));
             if let Some(word) = word {

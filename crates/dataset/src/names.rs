@@ -14,14 +14,18 @@ pub(super) struct Names {
     exact: BTreeSet<String>,
     /// Names that differ from one in `folded` by case alone.
     doubles: Vec<String>,
+    /// How many files are hidden.
+    hidden: usize,
 }
 
 impl Names {
     /// Takes the names that count. Hidden files are left out, as every program does: macOS puts
     /// `._000000.jpg` beside `000000.jpg`, which is no image.
     pub fn new(listed: Vec<String>) -> Names {
-        let exact: BTreeSet<String> = listed.into_iter().filter(|n| !is_hidden(n)).collect();
-        let mut names = Names { exact, ..Names::default() };
+        let all = listed.len();
+        let plain: Vec<String> = listed.into_iter().filter(|n| !is_hidden(n)).collect();
+        let hidden = all - plain.len();
+        let mut names = Names { exact: plain.into_iter().collect(), hidden, ..Names::default() };
         // Names in lower case come first, so that of two they are the ones that count.
         let by_case = |n: &&String| n.bytes().any(|b| b.is_ascii_uppercase());
         let (upper, lower): (Vec<&String>, Vec<&String>) = names.exact.iter().partition(by_case);
@@ -47,8 +51,11 @@ impl Names {
         }
     }
 
-    /// Says which names cannot be told apart from others.
+    /// Says which names cannot be told apart from others, or that all are hidden.
     pub fn note(&self) -> Option<String> {
+        if self.exact.is_empty() && self.hidden > 0 {
+            return Some(format!("{} hidden files do not count", self.hidden));
+        }
         let first = self.doubles.first()?;
         let other = self.folded.get(&folded(first))?;
         let n = self.doubles.len();
@@ -92,6 +99,7 @@ mod tests {
         ]);
         assert_eq!(n.folded().collect::<Vec<_>>(), ["../cam_params.json", "color/0.jpg"]);
         assert_eq!((n.find("color/._0.jpg"), n.note()), (None, None));
+        assert_eq!(names(&[".room/a", ".room/b"]).note().unwrap(), "2 hidden files do not count");
     }
 
     #[test]

@@ -203,7 +203,9 @@ pub fn open(
     }
     if options.axes == Axes::OpenGl {
         for frame in &mut all.frames {
-            frame.truth = frame.truth.map(|pose| pose.with_flipped_camera());
+            for pose in [&mut frame.truth, &mut frame.prior] {
+                *pose = pose.map(|pose| pose.with_flipped_camera());
+            }
         }
     }
 
@@ -451,6 +453,10 @@ impl Sequence for Reader {
 
     fn truth(&self, index: usize) -> Option<Pose> {
         self.frames.get(index)?.truth
+    }
+
+    fn prior(&self, index: usize) -> Option<Pose> {
+        self.frames.get(index)?.prior
     }
 
     fn time_s(&self, index: usize) -> f64 {

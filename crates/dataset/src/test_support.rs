@@ -69,6 +69,7 @@ pub fn renamed(n: usize, layout: Layout) -> MemorySource {
     let poses = String::from_utf8(from.get("traj.txt").unwrap().to_vec()).unwrap();
     let mut nerf_frames = Vec::new();
     let (mut rgb_list, mut depth_list, mut truth) = (String::new(), String::new(), String::new());
+    let mut odometry = String::from("timestamp, frame, x, y, z, qx, qy, qz, qw\n");
     for (i, line) in poses.lines().enumerate() {
         let color = from.get(&format!("results/frame{i:06}.png")).unwrap();
         let depth = from.get(&format!("results/depth{i:06}.png")).unwrap();
@@ -86,6 +87,18 @@ pub fn renamed(n: usize, layout: Layout) -> MemorySource {
             Layout::ScanNet => {
                 to.insert(format!("pose/{i}.txt"), line);
                 (format!("color/{i}.png"), format!("depth/{i}.png"))
+            }
+            Layout::Stray => (format!("rgb/{i:06}.png"), format!("depth/{i:06}.png")),
+            Layout::Polycam => {
+                let (c, turned) = (info().camera, frame(i).truth.unwrap().with_flipped_camera());
+                let mut json = serde_json::json!({
+                    "fx": c.fx, "fy": c.fy, "cx": c.cx + 0.5, "cy": c.cy + 0.5,
+                });
+                for (k, x) in turned.to_row_major()[..12].iter().enumerate() {
+                    json[format!("t_{}{}", k / 4, k % 4)] = (*x).into();
+                }
+                to.insert(format!("keyframes/cameras/{i}.json"), json.to_string());
+                (format!("keyframes/images/{i}.png"), format!("keyframes/depth/{i}.png"))
             }
             Layout::Images => (format!("rgb/view{i}.png"), format!("depth/view{i}.png")),
             Layout::Nerfstudio => {
@@ -108,6 +121,7 @@ pub fn renamed(n: usize, layout: Layout) -> MemorySource {
         let (t, q) = (pose.translation, pose.quaternion());
         let tq = [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(|x| x.to_string()).join(" ");
         truth += &format!("{:.4} {tq}\n", time - 0.003);
+        odometry += &format!("{time:.4}, {i:06}, {}\n", tq.replace(' ', ", "));
         to.insert(c, color);
         to.insert(d, depth);
         to.insert(format!("semantic_class/semantic_class_{i}.png"), label);
@@ -118,7 +132,11 @@ pub fn renamed(n: usize, layout: Layout) -> MemorySource {
             to.insert("depth.txt", format!("# depth\r\n{depth_list}"));
             to.insert("groundtruth.txt", truth);
         }
-        Layout::SevenScenes | Layout::ScanNet | Layout::Sens => {}
+        Layout::SevenScenes | Layout::ScanNet | Layout::Sens | Layout::Polycam => {}
+        Layout::Stray => {
+            to.insert("odometry.csv", odometry);
+            to.insert("camera_matrix.csv", "20, 0, 11.5\n0, 21, 7.25\n0, 0, 1\n");
+        }
         Layout::ReplicaNice | Layout::ReplicaVmap => to.insert("traj.txt", poses),
         Layout::Images => {
             to.insert("poses.txt", poses);

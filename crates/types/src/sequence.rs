@@ -140,6 +140,12 @@ pub trait Sequence {
     }
     /// Ground-truth pose of frame `index` without decoding its images.
     fn truth(&self, index: usize) -> Option<Pose>;
+    /// Returns the pose of frame `index` that the recording device estimated (`world_from_camera` in a
+    /// world of its own, metres). It may drift: it is no truth to score against.
+    fn prior(&self, index: usize) -> Option<Pose> {
+        let _ = index;
+        None
+    }
     /// A frame from a pose that is not of the sequence, where it can be made: `index` names it.
     /// `None` inside solids, and for recordings.
     fn view_from(&mut self, index: usize, world_from_camera: &Pose) -> Option<Frame> {

@@ -6,12 +6,14 @@
 mod images;
 mod interface;
 mod nerfstudio;
+mod polycam;
 mod replica;
 mod replica_vmap;
 mod scannet;
 mod sens;
 mod seven_scenes;
 mod stamps;
+mod stray;
 mod tum;
 #[cfg(test)]
 mod tum_tests;
@@ -54,6 +56,8 @@ registry! {
     ScanNet: scannet::ScanNet, "ScanNet, exported.";
     Sens: sens::Sens, "ScanNet, packed: one `.sens` file.";
     Nerfstudio: nerfstudio::Nerfstudio, "nerfstudio's `transforms.json`, with depth.";
+    Stray: stray::Stray, "Stray Scanner, with the frames of its film taken out.";
+    Polycam: polycam::Polycam, "Polycam's raw export.";
     Images: images::Images, "Any folders of images with a camera; taken when nothing else fits.";
 }
 

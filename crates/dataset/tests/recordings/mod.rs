@@ -56,6 +56,17 @@ pub fn recording(layout: Layout) -> MemorySource {
                 other.insert(format!("pose/{i}.txt"), line);
                 (format!("color/{i}.jpg"), format!("depth/{i}.png"))
             }
+            Layout::Stray => (format!("rgb/{i:06}.jpg"), format!("depth/{i:06}.png")),
+            Layout::Polycam => {
+                let c = info.camera;
+                let mut json =
+                    serde_json::json!({ "fx": c.fx, "fy": c.fy, "cx": c.cx, "cy": c.cy });
+                for (k, x) in pose.to_row_major()[..12].iter().enumerate() {
+                    json[format!("t_{}{}", k / 4, k % 4)] = (*x).into();
+                }
+                other.insert(format!("keyframes/cameras/{i}.json"), json.to_string());
+                (format!("keyframes/images/{i}.jpg"), format!("keyframes/depth/{i}.png"))
+            }
             _ => (format!("images/{i}.jpg"), format!("depth/{i}.png")),
         };
         let turned = pose.with_flipped_camera().to_row_major();
@@ -71,6 +82,19 @@ pub fn recording(layout: Layout) -> MemorySource {
     }
     let c = info.camera;
     match layout {
+        Layout::Polycam => {}
+        Layout::Stray => {
+            let camera = format!("{}, 0, {}\n0, {}, {}\n0, 0, 1\n", c.fx, c.cx, c.fy, c.cy);
+            other.insert("camera_matrix.csv", camera);
+            let mut table = String::from("timestamp, frame, x, y, z, qx, qy, qz, qw\n");
+            for (i, frame) in frames.iter().enumerate() {
+                let pose = frame.truth.unwrap();
+                let (t, q) = (pose.translation, pose.quaternion());
+                let numbers = [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(|x| x.to_string());
+                table += &format!("{}, {i:06}, {}\n", frame.time_s, numbers.join(", "));
+            }
+            other.insert("odometry.csv", table);
+        }
         Layout::ScanNet => {
             let depth = format!("{} 0 {} 0 0 {} {} 0 0 0 1 0 0 0 0 1", c.fx, c.cx, c.fy, c.cy);
             other.insert("intrinsic/intrinsic_depth.txt", depth);
