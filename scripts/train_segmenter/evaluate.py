@@ -63,7 +63,7 @@ def moved(depth, camera, poses):
 
 
 def score(model, settings, folder):
-    names, _, unit, paired = views.classes(folder)
+    names, _, _, unit, paired = views.classes(folder)
     n = len(names)
     confusion = np.zeros((n, n), np.int64)
     shared, flicker, true_flicker, rooms = 0, 0, 0, []

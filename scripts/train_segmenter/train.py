@@ -82,7 +82,7 @@ def right(model, folder):
     return hits / label.size
 
 
-def write_configuration(out, names, raw_ids):
+def write_configuration(out, names, raw_ids, colors):
     config = {
         "architectures": ["MteSlamBuiltInSegmenter"],
         "model_type": "mte-slam-built-in",
@@ -91,6 +91,7 @@ def write_configuration(out, names, raw_ids):
         "label2id": {n: i for i, n in enumerate(names)},
         # Ids of the classes in the built-in scenes' label images.
         "raw_ids": raw_ids,
+        "colors": colors,
     }
     preprocessor = {
         "do_resize": True,
@@ -122,7 +123,7 @@ def main():
     torch.manual_seed(a.seed)
     torch.use_deterministic_algorithms(True, warn_only=True)
     rng = np.random.default_rng(a.seed)
-    names, raw_ids, *_ = views.classes(a.train)
+    names, raw_ids, colors, *_ = views.classes(a.train)
     color, label = views.load_all(a.train)
     share = np.bincount(label.ravel(), minlength=len(names)) / label.size
     weights = np.clip((1.0 / len(names) / np.maximum(share, 1e-6)) ** 0.25, 0.7, 2.0)
@@ -139,7 +140,7 @@ def main():
     )
     out = Path(a.out)
     out.mkdir(parents=True, exist_ok=True)
-    write_configuration(out, names, raw_ids)
+    write_configuration(out, names, raw_ids, colors)
     started, total = time.time(), 0.0
     for step in range(1, a.steps + 1):
         images, labels = crop(rng, color, label, a.batch)

@@ -15,9 +15,9 @@ def scenes(folder):
 
 
 def classes(folder):
-    """Returns names and raw ids of the classes, the unit of depth in meters, and whether views come in pairs."""
+    """Returns names, raw ids and colors of the classes, the unit of depth in meters, and whether views come in pairs."""
     table = json.loads((Path(folder) / "classes.json").read_text())
-    return table["names"], table["raw_ids"], table["depth_unit_m"], table["pairs"]
+    return table["names"], table["raw_ids"], table["colors"], table["depth_unit_m"], table["pairs"]
 
 
 def load(folder, scene, part):

@@ -112,9 +112,10 @@ fn write_classes(out: &Path, scene: &dyn Sequence, pairs: bool) -> std::io::Resu
         |f: &dyn Fn(usize) -> String| (0..info.classes.len()).map(f).collect::<Vec<_>>().join(", ");
     let names = list(&|i| format!("\"{}\"", info.classes.classes[i].name));
     let raw = list(&|i| info.classes.classes[i].raw_id.to_string());
+    let colors = list(&|i| format!("{:?}", info.classes.classes[i].color));
     let unit = info.depth_unit_m;
     let text = format!(
-        "{{\"names\": [{names}], \"raw_ids\": [{raw}], \"depth_unit_m\": {unit}, \"pairs\": {pairs}}}\n"
+        "{{\"names\": [{names}], \"raw_ids\": [{raw}], \"colors\": [{colors}], \"depth_unit_m\": {unit}, \"pairs\": {pairs}}}\n"
     );
     fs::write(out.join("classes.json"), text)
 }
