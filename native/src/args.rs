@@ -13,9 +13,10 @@ pub use engine::{EngineArgs, EngineChoice};
 pub use evaluation::{CullChoice, EvalArgs, InferenceChoice, MiouProtocol};
 pub use objects::ObjectsArgs;
 pub use recording::{
-    ClassArgs, ColorChoice, ConvertArgs, InspectArgs, SelectionArgs, SensorArgs, TargetLayout,
+    ClassArgs, ColorChoice, ConvertArgs, InspectArgs, LabelArgs, SelectionArgs, SensorArgs,
+    TargetLayout,
 };
-pub use segmentation::{LabelArgs, SegmenterArgs, turn, turn_name};
+pub use segmentation::{SegmenterArgs, turn, turn_name};
 pub use suite::EvaluateArgs;
 
 use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
@@ -152,9 +153,9 @@ pub enum Command {
         what `run --labels DIR` and other tools read: label images with the ids of the network's classes, \
         their names in classes.json, and how certain the network is.\n\n\
         The output folder receives:\n    \
-        semantic_class/semantic_class_000000.png   ids of the classes, 16 bits; 65535 where there is none\n    \
-        confidence/000000.png                      probability of the class, in 1/255\n    \
-        classes.json                               ids, names and colours\n\n\
+        semantic_class_000000.png   ids of the classes, 16 bits; void where there is none\n    \
+        confidence/000000.png       probability of the class, in 1/255\n    \
+        classes.json                ids, names and colours\n\n\
         Examples:\n    \
         mte-slam label data/mine --segmenter models/segformer-b0 --out data/mine-labels\n    \
         mte-slam run data/mine --labels data/mine-labels\n    \

@@ -50,7 +50,7 @@ pub fn prepare(
     } else {
         configuration::resolve(config, default_preset)?
     };
-    // Labels of other frames than those that are mapped would do nothing.
+    // Labels of frames that are not mapped would do nothing, and most of those between are not.
     let every = effective.config.mapping.every as usize;
     let sequence = segmentation::labelled(sequence, &selection.segmentation, every, screen)?;
     let info = sequence.info();

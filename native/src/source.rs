@@ -14,8 +14,15 @@ const MAX_FILES: usize = 2_000_000;
 const MAX_FILE_BYTES: u64 = 1 << 30;
 /// Files that are also looked for above the folder, because scenes share them: Replica's camera,
 /// ScanNet's table of labels.
-const SHARED: [&str; 3] = [
+const SHARED: [&str; 10] = [
     "../cam_params.json",
+    "../../cam_params.json",
+    "../intrinsics.json",
+    "../../intrinsics.json",
+    "../camera-intrinsics.txt",
+    "../../camera-intrinsics.txt",
+    "../camera.txt",
+    "../../camera.txt",
     "../scannetv2-labels.combined.tsv",
     "../../scannetv2-labels.combined.tsv",
 ];
@@ -274,7 +281,8 @@ mod tests {
         }
         let source = FolderSource::open(&inner.join("results")).unwrap();
         assert_eq!(source.read("../../scannetv2-labels.combined.tsv").unwrap(), b"{}");
-        assert!(error(source.read("../../cam_params.json")).contains("no such file"));
+        assert_eq!(source.read("../../cam_params.json").unwrap(), b"{}");
+        assert!(error(source.read("../../secret.txt")).contains("no such file"));
         let source = FolderSource::open(&inner).unwrap();
         fs::remove_file(inner.join("b.txt")).unwrap();
         assert!(error(source.read("b.txt")).contains("no such file"));

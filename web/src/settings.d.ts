@@ -127,7 +127,7 @@ export interface Overrides {
   "keyframes.every"?: number;
   /** Device memory for keyframe images; over it the least useful are dropped. [MiB] Default 96; 1 to 65536. */
   "keyframes.budget_mib"?: number;
-  /** What turns semantic features into classes. Default ray. */
+  /** What turns semantic features into classes: `sample` is the paper's, for comparison, in builds with the feature `sample-head` alone. Default ray. */
   "semantics.head"?: "ray" | "sample";
   /** Use it. Default true. */
   "fusion.enabled"?: boolean;

@@ -140,6 +140,20 @@ pub struct ConvertArgs {
     pub selection: SelectionArgs,
 }
 
+/// `label`.
+#[derive(Debug, Args)]
+pub struct LabelArgs {
+    /// Folder, .zip or .sens of the recording.
+    #[arg(value_name = "DATASET", value_hint = ValueHint::AnyPath)]
+    pub dataset: PathBuf,
+    /// Folder to write to; must be empty or absent.
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub out: PathBuf,
+    /// Which part of the recording, how it is read, and the network.
+    #[command(flatten)]
+    pub selection: SelectionArgs,
+}
+
 fn depth_limit(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(m) if m.is_finite() && m > 0.0 => Ok(m),

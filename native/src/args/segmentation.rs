@@ -1,7 +1,6 @@
 //! Classes from a network.
 use clap::{Args, ValueHint};
 use mte_slam_segment::{InputSize, Turn};
-use std::path::PathBuf;
 
 /// A segmentation network, and how it is used.
 #[derive(Clone, Debug, Default, PartialEq, Args)]
@@ -20,7 +19,7 @@ pub struct SegmenterArgs {
     /// side].
     #[arg(long, value_name = "WxH", value_parser = input_size, help_heading = "Segmentation")]
     pub segment_size: Option<InputSize>,
-    /// Label every N-th frame [default: those that are mapped].
+    /// Label every N-th frame [default: as often as frames are mapped, `mapping.every`].
     #[arg(long, value_name = "N", value_parser = super::values::at_least_one, help_heading = "Segmentation")]
     pub segment_every: Option<usize>,
     /// Leave pixels unlabelled of whose class the network is less certain than this, 0 to 1.
@@ -43,20 +42,6 @@ pub struct SegmenterArgs {
     /// left out.
     #[arg(long, value_name = "indoor|FILE", help_heading = "Segmentation")]
     pub groups: Option<String>,
-}
-
-/// `label`.
-#[derive(Debug, Args)]
-pub struct LabelArgs {
-    /// Folder, .zip or .sens of the recording.
-    #[arg(value_name = "DATASET", value_hint = ValueHint::AnyPath)]
-    pub dataset: PathBuf,
-    /// Folder to write to; must be empty or absent.
-    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
-    pub out: PathBuf,
-    /// Which part of the recording, how it is read, and the network.
-    #[command(flatten)]
-    pub selection: super::SelectionArgs,
 }
 
 fn input_size(text: &str) -> Result<InputSize, String> {

@@ -38,7 +38,7 @@ pub fn run(args: &LabelArgs, screen: Screen) -> Result<()> {
             labelled += 1;
         }
         let png = class_png(w, h, &found.labels, &info.classes)?;
-        target.write(&format!("semantic_class/semantic_class_{number:06}.png"), &png)?;
+        target.write(&format!("semantic_class_{number:06}.png"), &png)?;
         let mut png = Vec::new();
         PngEncoder::new(&mut png).write_image(&found.confidence, w, h, ExtendedColorType::L8)?;
         target.write(&format!("confidence/{number:06}.png"), &png)?;

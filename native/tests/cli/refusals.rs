@@ -109,7 +109,13 @@ fn spoiled_recordings_fail_with_file_and_frame_and_leave_nothing() {
     spoiled("cam_params.json", |_| b"{".to_vec(), &[], &["cam_params.json"]);
     let folder = recording();
     fs::remove_file(folder.path().join("room/results/depth000004.png")).unwrap();
-    fail(folder.path(), &run_arguments(&[]), 1, &["frame000004.png has no depth image"]);
+    // Left out with a note, unless that is asked for.
+    let strict = run_arguments(&["--require-images"]);
+    fail(folder.path(), &strict, 1, &["depth000004.png", "no such file", "frame 4"]);
+    for (extra, part) in [(["--order", "sideways"], "time, file"), (["--max-depth", "0"], "metres")]
+    {
+        fail(folder.path(), &run_arguments(&extra), 2, &[part]);
+    }
 }
 
 #[test]

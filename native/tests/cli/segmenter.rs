@@ -54,11 +54,12 @@ fn a_run_by_a_network_is_the_run_by_its_labels_to_the_byte() {
     assert_eq!(eval["input_labels"], by_network["input_labels"]);
     assert_eq!(eval["semantics"]["miou_percent"], by_network["semantics"]["miou_percent"]);
 
-    // Only frames that are mapped need labels: those in between change nothing.
+    // By default as often as frames are mapped: another map, scored over the same frames.
     fs::rename(f.join("out"), f.join("by-network")).unwrap();
-    json_of(f, &run_arguments(&["--json", "--segmenter", "model"]));
+    let fewer = json_of(f, &run_arguments(&["--json", "--segmenter", "model"]));
+    assert_eq!(fewer["input_labels"], by_network["input_labels"]);
     let read = |out: &str| fs::read(f.join(out).join("mesh_semantic.ply")).unwrap();
-    assert!(read("by-network") == read("out"));
+    assert!(read("by-network") != read("out"));
 }
 
 #[test]
@@ -106,6 +107,7 @@ fn what_does_not_fit_is_refused_before_anything_slow() {
     write_model(f);
     fs::write(f.join("bad.onnx"), "no network at all").unwrap();
     fs::create_dir(f.join("empty")).unwrap();
+    fs::write(f.join("g.json"), r#"{"sky": "outdoors"}"#).unwrap();
     for (extra, code, parts) in [
         (&["--segmenter", "nowhere"][..], 1, &["nowhere", "no such file"][..]),
         (&["--segmenter", "empty"], 1, &["empty", "no .onnx file", "model.onnx"]),
@@ -115,7 +117,7 @@ fn what_does_not_fit_is_refused_before_anything_slow() {
         (&["--segmenter", "model", "--min-confidence", "2"], 2, &["0 to 1"]),
         (&["--segmenter", "model", "--turn", "up"], 2, &["right", "left"]),
         (&["--segmenter", "model", "--groups", "nowhere"], 2, &["nowhere", "indoor"]),
-        (&["--segmenter", "model", "--groups", "indoor"], 1, &["indoor", "none of the network's"]),
+        (&["--segmenter", "model", "--groups", "g.json"], 1, &["g.json", "none of the network's"]),
         (&["--segment-every", "2"], 2, &["--segmenter MODEL"]),
     ] {
         fail(f, &run_arguments(extra), code, parts);

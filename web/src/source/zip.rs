@@ -139,6 +139,10 @@ impl Source for ZipSource {
     fn read_range(&self, file: &str, offset: u64, bytes: usize) -> Result<Vec<u8>, SequenceError> {
         self.archive.read_range(file, offset, bytes)
     }
+
+    fn notes(&self) -> Vec<String> {
+        self.archive.notes()
+    }
 }
 
 #[cfg(test)]
