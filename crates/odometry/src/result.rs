@@ -36,7 +36,7 @@ pub struct Quality {
     pub references: usize,
 }
 
-/// What [`Odometer::track`] found.
+/// What [`Odometer::track`](crate::Odometer::track) found.
 #[derive(Clone, Debug)]
 pub struct OdometryResult {
     /// The pose; the prediction when the frame is lost.
