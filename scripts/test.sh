@@ -72,11 +72,13 @@ if [ "$what" = quick ]; then
 
     step "the kernels' twins on the CPU"
     MTE_SLAM_NO_GPU=1 MTE_SLAM_REQUIRE_GPU=0 \
-        cargo test --locked -p mte-slam-tests --test consistency --test gradients --no-fail-fast
+        cargo test --locked --workspace --test consistency --test gradients --no-fail-fast
 
     step "a short run"
     out=$(mktemp -d)
-    cargo run --locked --quiet -p mte-slam -- demo --out "$out/demo" --engine cpu --preset fast \
+    # All of the workspace, here as above: one crate alone has other features, and would compile anew.
+    cargo build --locked --workspace --bins
+    "$target/debug/mte-slam" demo --out "$out/demo" --engine cpu --preset fast \
         --frames 4 --width 64 --set mapping.rays=400 --set mapping.first_iterations=60 \
         --set mapping.iterations=4 --set mapping.final_iterations=2 \
         --set mapping.semantic_iterations=40 --set field.surface_fine_m=0.06 \
