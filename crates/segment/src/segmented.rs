@@ -36,17 +36,22 @@ impl<S: Sequence> Segmented<S> {
         &self.segmenter
     }
 
-    /// What the network says of frame `index`, whose image is `color`.
-    fn segment(&mut self, index: usize, color: &[[u8; 3]]) -> Result<&Segmentation, SequenceError> {
-        if self.last.as_ref().is_none_or(|(last, _)| *last != index) {
-            let (w, h) = (self.info.camera.width as usize, self.info.camera.height as usize);
-            let found = self.segmenter.segment(color, w, h).map_err(|e| of_frame(e, index))?;
-            self.last = Some((index, found));
-        }
-        match &self.last {
-            Some((_, found)) => Ok(found),
-            None => Err(SequenceError::OutOfRange { index, frames: self.info.frames }),
-        }
+    /// What the network says of frame `index`, whose image `color` gives when the network must be asked.
+    fn segment(
+        &mut self,
+        index: usize,
+        color: impl FnOnce(&mut S) -> Result<Vec<[u8; 3]>, SequenceError>,
+    ) -> Result<&Segmentation, SequenceError> {
+        let last = match self.last.take() {
+            Some(last) if last.0 == index => last,
+            _ => {
+                let color = color(&mut self.inner)?;
+                let (w, h) = (self.info.camera.width as usize, self.info.camera.height as usize);
+                let found = self.segmenter.segment(&color, w, h).map_err(|e| of_frame(e, index))?;
+                (index, found)
+            }
+        };
+        Ok(&self.last.insert(last).1)
     }
 
     /// What the network says of frame `index`.
@@ -54,11 +59,7 @@ impl<S: Sequence> Segmented<S> {
     /// # Errors
     /// A frame that cannot be read, or on which the network fails.
     pub fn segmentation(&mut self, index: usize) -> Result<&Segmentation, SequenceError> {
-        if self.last.as_ref().is_none_or(|(last, _)| *last != index) {
-            let frame = self.inner.frame(index)?;
-            return self.segment(index, &frame.color);
-        }
-        self.segment(index, &[])
+        self.segment(index, |inner| Ok(inner.frame(index)?.color))
     }
 }
 
@@ -82,10 +83,9 @@ impl<S: Sequence> Sequence for Segmented<S> {
         let mut frame = self.inner.frame(index)?;
         frame.labels = None;
         if index.is_multiple_of(self.every) {
-            let found = self.segment(index, &frame.color)?;
-            let (labels, features) = (found.labels.clone(), found.features.clone());
-            frame.labels = Some(labels);
-            frame.features = frame.features.or(features);
+            let found = self.segment(index, |_| Ok(frame.color.clone()))?;
+            frame.labels = Some(found.labels.clone());
+            frame.features = frame.features.or_else(|| found.features.clone());
         }
         Ok(frame)
     }
@@ -102,6 +102,10 @@ impl<S: Sequence> Sequence for Segmented<S> {
         // Its labels would be the recording's.
         let frame = self.inner.view_from(index, world_from_camera)?;
         Some(Frame { labels: None, ..frame })
+    }
+
+    fn prior(&self, index: usize) -> Option<Pose> {
+        self.inner.prior(index)
     }
 
     fn time_s(&self, index: usize) -> f64 {

@@ -149,6 +149,10 @@ impl<S: Sequence> Sequence for Grouped<S> {
         Some(frame)
     }
 
+    fn prior(&self, index: usize) -> Option<Pose> {
+        self.inner.prior(index)
+    }
+
     fn time_s(&self, index: usize) -> f64 {
         self.inner.time_s(index)
     }

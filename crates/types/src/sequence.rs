@@ -115,6 +115,10 @@ impl<S: Sequence + ?Sized> Sequence for Box<S> {
         (**self).view_from(index, world_from_camera)
     }
 
+    fn prior(&self, index: usize) -> Option<Pose> {
+        (**self).prior(index)
+    }
+
     fn time_s(&self, index: usize) -> f64 {
         (**self).time_s(index)
     }
