@@ -1,7 +1,7 @@
 //! `config.json` and `preprocessor_config.json`, as Hugging Face has them.
 use crate::{
     error::{SegmentError, invalid},
-    names::Meaning,
+    names::{Labels, Meaning},
     resize::Filter,
 };
 use serde::Deserialize;
@@ -164,15 +164,6 @@ impl Preprocessing {
             SizeRule::Own => scaled(1.0),
         }
     }
-}
-
-/// What `config.json` says of the classes.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Labels {
-    pub meanings: Vec<Meaning>,
-    /// Ids of the classes in label images, where they are not the indices.
-    pub raw_ids: Vec<u16>,
-    pub colors: Vec<[u8; 3]>,
 }
 
 #[derive(Deserialize)]

@@ -59,13 +59,13 @@ impl Tensor {
     }
 
     /// A map of classes: its columns and rows, and the classes.
-    pub fn map(&self) -> Option<([usize; 2], Vec<i32>)> {
+    pub fn map(&self) -> Option<([usize; 2], &[i32])> {
         let Numbers::Integers(values) = &self.numbers else { return None };
         let grid = match *self.shape.as_slice() {
             [h, w] | [1, h, w] | [1, 1, h, w] | [1, h, w, 1] => [w, h],
             _ => return None,
         };
-        Some((grid, values.clone()))
+        Some((grid, values))
     }
 }
 

@@ -27,6 +27,13 @@ enum Contents<'a> {
     Fixed,
 }
 
+/// Takes `n` bytes off the front; `None` where there are fewer.
+fn take<'a>(bytes: &mut &'a [u8], n: u64) -> Option<&'a [u8]> {
+    let (taken, rest) = bytes.split_at_checked(usize::try_from(n).ok()?)?;
+    *bytes = rest;
+    Some(taken)
+}
+
 fn varint(bytes: &mut &[u8]) -> Option<u64> {
     let mut x = 0u64;
     for shift in (0..64).step_by(7) {
@@ -47,20 +54,13 @@ fn fields(message: &[u8]) -> Option<Vec<Field<'_>>> {
     while !rest.is_empty() {
         let begin = rest;
         let key = varint(&mut rest)?;
-        let mut take = |n: u64| -> Option<&[u8]> {
-            let (taken, after) = rest.split_at_checked(usize::try_from(n).ok()?)?;
-            rest = after;
-            Some(taken)
-        };
         let contents = match key & 7 {
             0 => Contents::Number(varint(&mut rest)?),
-            1 => take(8).map(|_| Contents::Fixed)?,
-            5 => take(4).map(|_| Contents::Fixed)?,
+            1 => take(&mut rest, 8).map(|_| Contents::Fixed)?,
+            5 => take(&mut rest, 4).map(|_| Contents::Fixed)?,
             2 => {
                 let n = varint(&mut rest)?;
-                let (taken, after) = rest.split_at_checked(usize::try_from(n).ok()?)?;
-                rest = after;
-                Contents::Bytes(taken)
+                Contents::Bytes(take(&mut rest, n)?)
             }
             _ => return None,
         };
@@ -70,12 +70,8 @@ fn fields(message: &[u8]) -> Option<Vec<Field<'_>>> {
 }
 
 fn bytes_of<'a>(all: &[Field<'a>], number: u64) -> impl Iterator<Item = &'a [u8]> {
-    let found: Vec<&[u8]> = all
-        .iter()
-        .filter(|f| f.number == number)
-        .filter_map(|f| if let Contents::Bytes(b) = f.contents { Some(b) } else { None })
-        .collect();
-    found.into_iter()
+    let bytes = |f: &Field<'a>| if let Contents::Bytes(b) = f.contents { Some(b) } else { None };
+    all.iter().filter(move |f| f.number == number).filter_map(bytes)
 }
 
 fn push_varint(out: &mut Vec<u8>, mut x: u64) {

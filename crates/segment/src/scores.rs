@@ -71,15 +71,15 @@ impl Scores {
             likeliest: Vec::with_capacity(w * h),
         };
         let columns: Vec<_> = (0..w).map(|x| between(x, w, self.columns)).collect();
-        let mut row = vec![0.0f32; self.columns * self.classes];
+        let stride = self.columns * self.classes;
+        let mut row = vec![0.0f32; stride];
         let mut scores = vec![0.0f32; count];
         // The last one is "none of them".
         let mut sums = vec![0.0f32; n + 1];
         for y in 0..h {
             let (top, bottom, v) = between(y, h, self.rows);
-            let line = |r: usize| &self.values[r * row.len()..][..row.len()];
-            let (a, b) = (line(top).to_vec(), line(bottom));
-            for ((x, a), b) in row.iter_mut().zip(&a).zip(b) {
+            let line = |r: usize| &self.values[r * stride..][..stride];
+            for ((x, a), b) in row.iter_mut().zip(line(top)).zip(line(bottom)) {
                 *x = a + (b - a) * v;
             }
             for &(left, right, u) in &columns {

@@ -1,9 +1,9 @@
 //! A network, ready to be used.
 use crate::{
-    config::{InputSize, Labels, MAX_SIDE, Preprocessing, SizeRule},
+    config::{InputSize, MAX_SIDE, Preprocessing, SizeRule},
     error::{SegmentError, invalid},
     files::ModelFiles,
-    names::{Meaning, by_count},
+    names::{Labels, Meaning, by_count},
     network::{Network, Tensor},
     output::{Classes, Features, Order, Understood, understand},
     resize::{Turn, resized},
@@ -105,8 +105,8 @@ impl Segmenter {
             (None, named) => named,
         };
         let probabilities = scores.is_some_and(|s| s.probabilities || s.look_like_probabilities());
-        let Named { meanings, from } = named(&name, &labels, count, &mut warnings)?;
-        let (table, targets) = table_of(&name, &labels, &meanings, options.groups.as_ref())?;
+        let (labels, from) = named(&name, labels, count, &mut warnings)?;
+        let (table, targets) = table_of(&name, &labels, options.groups.as_ref())?;
         let summary = summary(&network, &preprocessing, size, &shown, understood, &table, from);
         let network = network.only(&needed(understood));
         let understood = renumbered(understood);
@@ -179,7 +179,7 @@ impl Segmenter {
         let classified = match self.understood.classes {
             Classes::Map { output } => {
                 let (grid, map) = outputs[output].map().ok_or_else(|| changed("its classes"))?;
-                Classified::of_map(&map, grid, turned, &self.targets)
+                Classified::of_map(map, grid, turned, &self.targets)
             }
             classes => {
                 let scores = scores_of(&outputs, classes).ok_or_else(|| changed("its scores"))?;
@@ -239,58 +239,47 @@ fn size_of_input(
     Ok(())
 }
 
-struct Named {
-    meanings: Vec<Meaning>,
-    from: String,
-}
-
-/// What the `count` classes mean.
+/// What the `count` classes mean, and who says so.
 fn named(
     name: &str,
-    labels: &Labels,
+    labels: Labels,
     count: usize,
     warnings: &mut Vec<String>,
-) -> Result<Named, SegmentError> {
-    if !labels.meanings.is_empty() {
-        let found = labels.meanings.len();
-        if found > count {
-            let found = format!("{found} names");
-            return Err(invalid(
-                name,
-                "id2label of config.json",
-                found,
-                format!("{count}, as its output has"),
-            ));
-        }
-        let mut meanings = labels.meanings.clone();
-        meanings.resize(count, Meaning::Untrained);
-        return Ok(Named { meanings, from: "config.json".into() });
+) -> Result<(Labels, &'static str), SegmentError> {
+    let found = labels.meanings.len();
+    if found > count {
+        let (found, expected) = (format!("{found} names"), format!("{count}, as its output has"));
+        return Err(invalid(name, "id2label of config.json", found, expected));
     }
-    if let Some((set, meanings)) = by_count(count) {
+    if found > 0 {
+        let mut labels = labels;
+        labels.meanings.resize(count, Meaning::Untrained);
+        return Ok((labels, "config.json"));
+    }
+    if let Some((set, labels)) = by_count(count) {
         warnings.push(format!(
             "{name}: no names of the classes: there are {count}, so those of {set} are taken; a \
              config.json beside the model can name them"
         ));
-        return Ok(Named { meanings, from: set.into() });
+        return Ok((labels, set));
     }
     warnings.push(format!(
         "{name}: no names of its {count} classes: expected a config.json beside it, {{\"id2label\": \
          {{\"0\": \"wall\"}}}}"
     ));
     let meanings = (0..count).map(|i| Meaning::Class(format!("class {i}"))).collect();
-    Ok(Named { meanings, from: "numbers".into() })
+    Ok((Labels { meanings, ..Labels::default() }, "numbers"))
 }
 
 /// The table of classes, and what becomes of each class of the network.
 fn table_of(
     name: &str,
     labels: &Labels,
-    meanings: &[Meaning],
     groups: Option<&Groups>,
 ) -> Result<(ClassTable, Vec<Target>), SegmentError> {
     let mut classes = Vec::new();
     let mut targets = Vec::new();
-    for (i, meaning) in meanings.iter().enumerate() {
+    for (i, meaning) in labels.meanings.iter().enumerate() {
         targets.push(match meaning {
             Meaning::None => Target::None,
             Meaning::Untrained => Target::Skip,
@@ -351,7 +340,7 @@ fn summary(
     outputs: &[crate::output::Output],
     understood: Understood,
     table: &ClassTable,
-    names: String,
+    names: &str,
 ) -> String {
     let output = match understood.classes {
         Classes::Scores { output, order } => {
